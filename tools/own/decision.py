@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from glider.tools.inference.healthy_level import HealthyLevel
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import marginalised
-from glider.tools.own.effects import NOISE, OUTPUT, PARAMETER, PUSH, Effect
+from glider.tools.own.effects import FORM, NOISE, OUTPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.excess_noise import NOISE_SIZES
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
 
@@ -23,6 +23,7 @@ SIZES = NOISE_SIZES  # tolerances, rms over the windows
 # commanded and read; a constant force that no label has, seldom
 FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
 DRIFT_ODDS = 0.1  # of an output, in one run: instruments drift over days, which in a run is a bias
+ANOTHER = 0.1  # that a further effect stands beside one
 STRANGE = 0.1  # that more is left than a hypothesis says
 FORM_SHARES = (0.0, HEALTHY.form_error)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
@@ -121,8 +122,9 @@ def log_odds(effect: Effect) -> float:
     return float(np.log(DRIFT_ODDS if drifts else FAMILY_ODDS.get(effect.family, 1.0)))
 
 
-def usual_share(healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int) -> float:
-    """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it brings too.
+def usual_share(healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int) -> tuple[float, float]:
+    """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it brings too, and
+    all of that evidence, by a parabola.
 
     reach: tolerances that a spread of it moves the channels.
     """
@@ -134,7 +136,35 @@ def usual_share(healthy: Healthy, k: int, reach: float, size: float, sd: float, 
         change = logsumexp(-0.5 * (size**2 / wide + np.log(wide))) - np.log(len(SIZES))
         return float(change + 0.5 * (size**2 / narrow + np.log(narrow)))
 
-    return max(0.0, odds(0.0) - odds(usual))
+    return max(0.0, odds(0.0) - odds(usual)), odds(0.0)
+
+
+def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: int) -> np.ndarray:
+    """Log evidence of hypotheses (hypotheses,), each with what a usual deviation of one label more brings it.
+
+    What healthy runs show of a label is no change: a hypothesis without it explains that much, too. Far from what is
+    usual the likelihood is no parabola: of what a label really gains the same part is taken.
+    """
+    gained = {frozenset(one.labels): one.evidence - log_prior(healthy, one.labels) for one in every}
+    most = dict.fromkeys(gained, 0.0)
+    for one in every:
+        for label, k, size, sd in zip(one.labels, healthy.at(one.labels), one.sizes, one.sd, strict=True):
+            without = frozenset(one.labels) - {label}
+            if without in gained:
+                share, all_of_it = usual_share(healthy, k, float(reach[k]), float(size), float(sd), runs)
+                gain = gained[frozenset(one.labels)] - gained[without]
+                part = float(np.clip(gain / all_of_it, 0.0, 1.0)) if all_of_it > 0.0 else 1.0
+                most[without] = max(most[without], part * share)
+    return np.array([one.evidence + most[frozenset(one.labels)] for one in every])
+
+
+def log_prior(healthy: Healthy, labels: Sequence[str]) -> float:
+    """Of a hypothesis: that something changed, which label, and that another stands beside it."""
+    if not labels:
+        return float(np.log1p(-HEALTHY.changed))
+    named = sum(one.family not in (PUSH, FORM) for one in healthy.effects)
+    each = [log_odds(healthy.effects[k]) - np.log(named) for k in healthy.at(labels)]
+    return float(np.log(HEALTHY.changed) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
 
 def strangeness(healthy: Healthy, one: Hypothesis, nothing: Hypothesis) -> float:
@@ -160,12 +190,7 @@ def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: i
 
     reach: tolerances (k,) that a spread of each label moves the channels.
     """
-    # of every label what healthy runs show of it is no change
-    logs = np.array([
-        one.evidence - sum(usual_share(healthy, k, float(reach[k]), float(size), float(sd), runs)
-                           for k, size, sd in zip(healthy.at(one.labels), one.sizes, one.sd, strict=True))
-        for one in every
-    ])  # fmt: skip
+    logs = with_usual(every, healthy, reach, runs)
     known = {one.label: one for one in healthy.effects}
     noisy = np.array([any(known[label].family == NOISE for label in one.labels) for one in every])
     # noise is excess only if more is left without it than healthy runs leave; else those with it are out

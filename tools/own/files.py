@@ -72,7 +72,7 @@ class IdentifiedTable(Table):
     parameters: list[str]
     covariance: list[list[float]]  # of `parameters`, in their units
     sessions: Annotated[int, msgspec.Meta(ge=1)] = 1
-    inflation: Positive = 1.0  # of all channels together
+    inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of all channels together
     run_inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of what runs say of the values they share
     channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Pooled, run_values
 from glider.tools.own.decision import (
     FORM_SHARES,
@@ -26,6 +25,7 @@ from glider.tools.own.decision import (
     Posterior,
     decide,
     log_odds,
+    log_prior,
     strangeness,
 )
 from glider.tools.own.effects import FORM, NOISE, PUSH, moved
@@ -33,7 +33,6 @@ from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, re
 from glider.tools.own.hierarchy import Expansion, RunLevel, expand, followed
 from glider.tools.own.observer import Observer
 
-ANOTHER = 0.1  # that a further effect stands beside one
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS, LONGEST_MOVE = 6, 3, 4.0
 ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all others begin
@@ -149,8 +148,8 @@ class Engine:
         if every:
             found = self.expansions(own, np.arange(self.k), keep=True)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-        fitted = Hypothesis(labels, evidence + self.log_prior(labels), shared[places], sd, shared, own, left, 0.0,
-                            found, everywhere=True)  # fmt: skip
+        evidence += log_prior(self.healthy, labels)
+        fitted = Hypothesis(labels, evidence, shared[places], sd, shared, own, left, 0.0, found, everywhere=True)
         if not every:
             fitted.forget()
         return fitted
@@ -225,14 +224,6 @@ class Engine:
         *sizes, form = grid[best]
         at = replace(pooled, V=self.variance(by.V, places, sizes, shared, form))
         return by, at, evidence, np.clip(mean[best], self.low[places], self.high[places]), sd[best]
-
-    def log_prior(self, labels: Sequence[str]) -> float:
-        """Of a hypothesis: that something changed, which label, and that another stands beside it."""
-        if not labels:
-            return float(np.log1p(-HEALTHY.changed))
-        named = sum(one.family not in (PUSH, FORM) for one in self.healthy.effects)
-        each = [log_odds(self.healthy.effects[k]) - np.log(named) for k in self.healthy.at(labels)]
-        return float(np.log(HEALTHY.changed) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
     def label_gains(self, slope: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Log evidence (k,) that each label gains by its parabola, beside what is integrated out, and its size there.
@@ -406,7 +397,8 @@ class Engine:
         _, mean, sd = max(table, key=lambda row: row[0])
         size, error = windows.size(SIZES[-1])
         self.reach[self.healthy.at([label])] = windows.reach
-        found = replace(begin, labels=labels, evidence=evidence + self.log_prior(labels), sizes=np.append(mean, size),
+        evidence += log_prior(self.healthy, labels)
+        found = replace(begin, labels=labels, evidence=evidence, sizes=np.append(mean, size),
                         sd=np.append(sd, error), left=windows.left(size))  # fmt: skip
         found.strange = strangeness(self.healthy, found, nothing)
         gain, left = found.evidence - nothing.evidence, np.sqrt(found.left.mean())

@@ -9,7 +9,7 @@ from scipy.special import logsumexp
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Pooled, learn_scatter
-from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, usual_share
+from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, log_prior, usual_share
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
 from glider.tools.own.identify import left_out, run_inflation
@@ -122,7 +122,7 @@ def test_a_label_alone_gains_what_its_evidence_says():
 @pytest.mark.parametrize(("usual", "least", "most"), [(0.0, 0.0, 0.0), (0.05, 1.0, 12.0), (3.0, 15.0, 1e3)])
 def test_what_healthy_runs_show_of_a_label_is_no_evidence_of_a_change(usual, least, most):
     asked = engine(4, usual=np.array([usual, 0.0, 0.0]))
-    assert least <= usual_share(asked.healthy, 0, float(asked.reach[0]), 0.5, 0.08, 4) <= most
+    assert least <= usual_share(asked.healthy, 0, float(asked.reach[0]), 0.5, 0.08, 4)[0] <= most
 
 
 def test_of_a_label_a_force_may_be_that_its_equations_do_not_have():
@@ -163,7 +163,7 @@ def test_a_label_counts_over_all_spans_in_which_it_may_be():
 
 def test_that_nothing_changed_has_its_prior_probability():
     asked = engine(4)
-    assert asked.log_prior(()) == pytest.approx(np.log1p(-HEALTHY.changed))
+    assert log_prior(asked.healthy, ()) == pytest.approx(np.log1p(-HEALTHY.changed))
 
 
 LEVEL = RunLevel(ChannelErrors(np.ones(1), np.full(1, 4.0)), 2.0, 0.5)
