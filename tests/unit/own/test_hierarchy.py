@@ -9,7 +9,16 @@ from scipy.special import logsumexp
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Pooled, learn_scatter
-from glider.tools.own.decision import FORM_SHARES, SIZES, Deviations, Healthy, Hypothesis, log_prior, usual_share
+from glider.tools.own.decision import (
+    FORM_SHARES,
+    SIZES,
+    Deviations,
+    Healthy,
+    Hypothesis,
+    decide,
+    log_prior,
+    usual_share,
+)
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
 from glider.tools.own.identify import left_out, run_inflation
@@ -204,3 +213,19 @@ def test_runs_that_differ_by_more_than_they_say_count_for_less(excess):
     assert np.median(sizes) == pytest.approx(excess**2, rel=0.3)
     assert min(sizes) >= 1.0
     assert run_inflation(Pooled.of(runs[:2], V), left_out(runs[:2], V), free) == 1.0
+
+
+@pytest.mark.parametrize(("gain", "size", "first"), [(2300.0, 3.0, "gain"), (2.0, 0.015, "none")], ids=["far", "usual"])
+def test_a_label_far_from_what_is_usual_is_not_lost_to_another(gain, size, first):
+    """0.03 spreads are usual of the first label; it is known to 0.005 and gains what that says, the second half of it."""
+    one = healthy(usual=np.array([0.03, 0.0, 0.0]))
+
+    def fitted(labels: tuple[str, ...], nat: float, sizes: list[float]) -> Hypothesis:
+        known = np.array(sizes)
+        return Hypothesis(labels, nat + log_prior(one, labels), known, np.full(len(known), 0.005), np.zeros(3),
+                          np.zeros((4, 3)), np.ones(4))  # fmt: skip
+
+    every = [fitted((), 0.0, []), fitted(("gain",), gain, [size]), fitted(("mass",), 0.5 * gain, [size])]
+    every.append(fitted(("gain", "mass"), gain - 4.0, [size, 0.0]))
+    found = decide(every, one, np.full(3, 1.0 / size), 4)
+    assert max(found.chances, key=lambda label: found.chances[label]) == first
