@@ -217,7 +217,7 @@ def test_runs_that_differ_by_more_than_they_say_count_for_less(excess):
 
 @pytest.mark.parametrize(("gain", "size", "first"), [(2300.0, 3.0, "gain"), (2.0, 0.015, "none")], ids=["far", "usual"])
 def test_a_label_far_from_what_is_usual_is_not_lost_to_another(gain, size, first):
-    """0.03 spreads are usual of the first label; it is known to 0.005 and gains what that says, the second half of it."""
+    """0.03 spreads are usual of the first label, known to 0.005; it gains what that says, the second half of it."""
     one = healthy(usual=np.array([0.03, 0.0, 0.0]))
 
     def fitted(labels: tuple[str, ...], nat: float, sizes: list[float]) -> Hypothesis:
