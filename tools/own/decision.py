@@ -145,7 +145,9 @@ def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray,
     What healthy runs show of a label is no change: a hypothesis without it explains that much, too. Far from what is
     usual the likelihood is no parabola: of what a label really gains the same part is taken.
     """
-    gained = {frozenset(one.labels): one.evidence - log_prior(healthy, one.labels) for one in every}
+    gained = dict[frozenset[str], float]()
+    for one in sorted(every, key=lambda one: one.evidence):  # labels that were fitted twice: the better fit
+        gained[frozenset(one.labels)] = one.evidence - log_prior(healthy, one.labels)
     most = dict.fromkeys(gained, 0.0)
     for one in every:
         for label, k, size, sd in zip(one.labels, healthy.at(one.labels), one.sizes, one.sd, strict=True):

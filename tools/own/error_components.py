@@ -23,7 +23,7 @@ from scipy.special import logsumexp
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.own.declare import Declaration
-from glider.tools.own.excess_noise import SEGMENTS, patterns_of
+from glider.tools.own.excess_noise import SEGMENTS, at_noises, patterns_of
 from glider.tools.own.observer import Observer
 
 RATIOS, RATIO_SCALE = np.geomspace(1.0, 100.0, 60), 1.0  # of variances; prior 1 sigma of their logarithm
@@ -71,11 +71,8 @@ def patterns(observer: Observer, n: int, horizon: float) -> Patterns:
     noises = observer.declared.noises
     starts, ends = observer.windows(n, horizon)
     shapes = patterns_of(observer.runs[n].t, starts, ends)[:SEGMENTS]
-    pushes = np.zeros((len(noises) * SEGMENTS, len(observer.runs[n].t), len(noises)))
-    for j, one in enumerate(noises):
-        pushes[j * SEGMENTS : (j + 1) * SEGMENTS, :, j] = max(one.density, 1e-6) * shapes
     begun = observer.unsettled(n, horizon)
-    pushed = observer.pushed(n, pushes, horizon)
+    pushed = observer.pushed(n, at_noises(observer.declared, shapes), horizon)
     forced, started = pushed - begun[0], begun[1:] - begun[0]
     held = forced.reshape(len(noises), SEGMENTS, *begun.shape[1:]).sum(axis=1) / np.sqrt(SEGMENTS)
     each = [SEGMENTS] * len(noises) + [1] * len(noises) + [len(started)]

@@ -15,11 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from glider.tools.own.declare import Declaration
 from glider.tools.own.effects import Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
 from glider.tools.own.observer import Observer
 
 NOISE_SEED = 1
+LEAST_DENSITY = 1e-6  # of a noise that the file has none of
 SEGMENTS = 12  # of a window, over each of which a force that stands for white noise is held
 PERIODS = tuple(np.geomspace(2.0, 10.0, 8))  # s; surface waves and strokes of fins
 NOISE_SIZES = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # tolerances, rms over the windows
@@ -62,20 +64,24 @@ def within_segments(t: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     return found
 
 
+def at_noises(declared: Declaration, shapes: np.ndarray) -> np.ndarray:
+    """Forces (noises x shapes, rows, noises): of every noise's density one after the other in shapes (shapes, rows)."""
+    found = np.zeros((len(declared.noises), len(shapes), shapes.shape[1], len(declared.noises)))
+    for j, one in enumerate(declared.noises):
+        found[j, :, :, j] = max(one.density, LEAST_DENSITY) * shapes
+    return found.reshape(-1, *found.shape[2:])
+
+
 def responses(observer: Observer, n: int, horizon: float, healthy: ChannelErrors) -> Responses:
     """What a density's forces at every noise do to run n, about the observer's own model."""
     starts, ends = observer.windows(n, horizon)
     shapes = patterns_of(observer.runs[n].t, starts, ends)
-    noises, fast = observer.declared.noises, within_segments(observer.runs[n].t, shapes)
-    pushes = np.zeros((1 + len(noises) * (len(shapes) + 1), len(observer.runs[n].t), len(noises)))
-    for j, one in enumerate(noises):
-        density = max(one.density, 1e-6)
-        pushes[1 + j * len(shapes) : 1 + (j + 1) * len(shapes), :, j] = density * shapes
-        pushes[1 + len(noises) * len(shapes) + j, :, j] = density * fast
-    errors = observer.pushed(n, pushes, horizon)
+    fast, declared = within_segments(observer.runs[n].t, shapes), observer.declared
+    pushes = np.concatenate([at_noises(declared, shapes), at_noises(declared, fast[None])])
+    errors = observer.pushed(n, np.concatenate([np.zeros_like(pushes[:1]), pushes]), horizon)
     moves, seen = errors[1:] - errors[0], np.isfinite(observer.runs[n].outputs).any(axis=0)
     each = healthy.independent(n, moves)
-    count = len(observer.declared.noises)
+    count = len(declared.noises)
     within = (each[len(each) - count :] ** 2).mean(axis=1)
     return Responses(each[: len(each) - count], healthy.independent(n, errors[0]),
                      (moves[: len(each) - count, :, seen] ** 2).mean(axis=(1, 2)), within,

@@ -331,20 +331,19 @@ class Observer:
         begun = int(self.windows(n, horizon)[0][-1]) + 1  # rows until the last window has begun
 
         def one(point: ModelPoint) -> np.ndarray:
-            predicted = self.predict(n, point, horizon, self.follow(n, point, by, begun))
-            return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
+            return self._smooth_errors(n, point, horizon, self.follow(n, point, by, begun))
 
         return np.array(self.each(one, points))
+
+    def _smooth_errors(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:
+        """Errors (scored rows, outputs) of `predict`, turns counted, 0 where nothing was measured."""
+        predicted = self.predict(n, point, horizon, states, beside)
+        return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
 
     def pushed(self, n: int, pushes: np.ndarray, horizon: float) -> np.ndarray:
         """Errors of the observer's own model, as `residuals`, under forces (patterns, rows, noises) beside its own."""
         states = self.filter(n, self.point).states
-
-        def one(beside: np.ndarray) -> np.ndarray:
-            predicted = self.predict(n, self.point, horizon, states, beside)
-            return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
-
-        return np.array(self.each(one, pushes))
+        return np.array(self.each(lambda one: self._smooth_errors(n, self.point, horizon, states, one), pushes))
 
     def unsettled(self, n: int, horizon: float) -> np.ndarray:
         """Errors of the observer's own model, as `residuals`: as it is, and begun 1 sigma of the filter off in each of
@@ -365,12 +364,7 @@ class Observer:
                 states[row, : len(self.kinds)] = names.normalised(names.plus(x, root[:m, k], self.kinds), self.kinds)
                 states[row, len(self.kinds) :] += root[m:, k]
             begun.append(states)
-
-        def one(states: np.ndarray) -> np.ndarray:
-            predicted = self.predict(n, self.point, horizon, states)
-            return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
-
-        return np.array(self.each(one, begun))
+        return np.array(self.each(lambda one: self._smooth_errors(n, self.point, horizon, one), begun))
 
     def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
         """Flights side by side: on two threads where they are compiled, every second on each."""
