@@ -43,6 +43,7 @@ from glider.tools.own.runs_fit import (
     USUAL_SCATTER,
     RunsFit,
     left_by,
+    level_scatter,
 )
 
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
@@ -137,10 +138,13 @@ def identify(
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
-    fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales)))
-    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter).led(say)
+    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter)
+    fit = fit.led_at_levels(say)
+    fit_levels(observer, [moved(declared, observer.point, nuisance, row) for row in fit.own],
+               fit.errors.scales, say)  # fmt: skip
+    fit = fit.led_with_differences(say)
     fit, components, notes = with_components(fit, vehicles, say)
     values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
     fit.errors = left_by(fit.expansions(), fit.errors)
@@ -165,6 +169,7 @@ def identify(
     between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
+    covariance = no_surer_than_jackknife(covariance, every, others)
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     # to first order in what leaving a run out moves
     after = _held_out(observer, nuisance, [values + one.mean() - every.mean() for one in others], limits)
@@ -193,7 +198,7 @@ def with_components(
     )
     say(f"errors of windows: {learned.said(declared)}")
     whitened = replace(fit.errors, whitenings=[Whitening(one, learned) for one in found])
-    tried = replace(fit, errors=whitened).led(say, differ=True)
+    tried = replace(fit, errors=whitened).led_with_differences(say)
     warm = [marginalised(one, tried.scatter) for one in tried.expansions()]
     ratio = run_inflation(Pooled.of(warm, tried.V), left_out(warm, tried.V), of)
     chance = independence(ratio, count)
@@ -222,6 +227,19 @@ def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> 
     expected = sum(np.diag(one.covariance() - every.covariance())[free] for one in others)
     ratio = (moves**2).sum(axis=0) / np.maximum(expected, 1e-12)
     return max(1.0, float(np.median(ratio)))
+
+
+def no_surer_than_jackknife(covariance: np.ndarray, every: Pooled, others: Sequence[Pooled]) -> np.ndarray:
+    """A covariance (k, k) of shared values with no variance below that of the jackknife over runs; correlations stay.
+
+    A few flights may be all that tell one number, in another way than the rest (`run_inflation` is of all numbers).
+    """
+    if len(others) < MIN_SCATTER_RUNS:
+        return covariance
+    moves = np.array([one.mean() - every.mean() for one in others])
+    variance = (1.0 - 1.0 / len(moves)) * (moves**2).sum(axis=0)
+    times = np.sqrt(np.maximum(variance / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return covariance * np.outer(times, times)
 
 
 def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tuple[list[Effect], np.ndarray]:
@@ -267,12 +285,6 @@ def in_sessions(found: Sequence[Expansion], scatter: np.ndarray, counts: Sequenc
     runs, ends = [marginalised(one, scatter) for one in found], np.cumsum(counts)
     return [Pooled.of(runs[end - count : end], np.zeros(0)).parabola()
             for count, end in zip(counts, ends, strict=True)]  # fmt: skip
-
-
-def level_scatter(found: Sequence[Expansion]) -> float:
-    """1 sigma from run to run of the logarithm of the mean square that is left."""
-    logs = np.log([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-    return float(logs.std(ddof=1)) if len(logs) > 1 else 0.5
 
 
 def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
