@@ -169,7 +169,6 @@ def identify(
     between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
-    covariance = no_surer_than_jackknife(covariance, every, others)
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     # to first order in what leaving a run out moves
     after = _held_out(observer, nuisance, [values + one.mean() - every.mean() for one in others], limits)
@@ -227,19 +226,6 @@ def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> 
     expected = sum(np.diag(one.covariance() - every.covariance())[free] for one in others)
     ratio = (moves**2).sum(axis=0) / np.maximum(expected, 1e-12)
     return max(1.0, float(np.median(ratio)))
-
-
-def no_surer_than_jackknife(covariance: np.ndarray, every: Pooled, others: Sequence[Pooled]) -> np.ndarray:
-    """A covariance (k, k) of shared values with no variance below that of the jackknife over runs; correlations stay.
-
-    A few flights may be all that tell one number, in another way than the rest (`run_inflation` is of all numbers).
-    """
-    if len(others) < MIN_SCATTER_RUNS:
-        return covariance
-    moves = np.array([one.mean() - every.mean() for one in others])
-    variance = (1.0 - 1.0 / len(moves)) * (moves**2).sum(axis=0)
-    times = np.sqrt(np.maximum(variance / np.maximum(np.diag(covariance), 1e-300), 1.0))
-    return covariance * np.outer(times, times)
 
 
 def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tuple[list[Effect], np.ndarray]:

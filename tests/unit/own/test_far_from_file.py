@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from glider.tools.inference.pooled import Pooled
 from glider.tools.own.check import load_own
-from glider.tools.own.identify import identify, no_surer_than_jackknife
+from glider.tools.own.identify import identify
 from glider.tools.own.noise_levels import fit_levels
 from glider.tools.own.observer import observer_of
 from glider.tools.own.runs import OwnRun
@@ -79,19 +78,3 @@ def test_noise_levels_leave_windows_no_worse_predicted(vehicle):
 
     assert left(observer.point) <= left(file)
     assert said[0].startswith("noise levels")
-
-
-def test_what_one_flight_alone_tells_is_as_uncertain_as_without_it():
-    """Ten runs know two numbers alike; an eleventh, much surer of the second, is far from them."""
-    V, own = 100.0 * np.eye(2), np.diag([4.0, 4.0])
-    means = [np.zeros(2)] * 10 + [np.array([0.0, 3.0])]
-    infos = [own] * 10 + [np.diag([4.0, 400.0])]
-
-    def pooled(places) -> Pooled:
-        return Pooled(sum(infos[n] for n in places), sum(infos[n] @ means[n] for n in places), 0.0, V)
-
-    every = pooled(range(11))
-    others = [pooled([m for m in range(11) if m != n]) for n in range(11)]
-    found = no_surer_than_jackknife(every.covariance(), every, others)
-    assert found[0, 0] == pytest.approx(every.covariance()[0, 0])
-    assert np.sqrt(found[1, 1]) == pytest.approx(every.mean()[1] * np.sqrt(10.0 / 11.0), rel=0.02)
