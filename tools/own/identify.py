@@ -43,7 +43,6 @@ from glider.tools.own.runs_fit import (
     USUAL_SCATTER,
     RunsFit,
     left_by,
-    level_scatter,
 )
 
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
@@ -138,13 +137,10 @@ def identify(
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
+    fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales)))
-    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter)
-    fit = fit.led_at_levels(say)
-    fit_levels(observer, [moved(declared, observer.point, nuisance, row) for row in fit.own],
-               fit.errors.scales, say)  # fmt: skip
-    fit = fit.led_with_differences(say)
+    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter).led(say)
     fit, components, notes = with_components(fit, vehicles, say)
     values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
     fit.errors = left_by(fit.expansions(), fit.errors)
@@ -197,7 +193,7 @@ def with_components(
     )
     say(f"errors of windows: {learned.said(declared)}")
     whitened = replace(fit.errors, whitenings=[Whitening(one, learned) for one in found])
-    tried = replace(fit, errors=whitened).led_with_differences(say)
+    tried = replace(fit, errors=whitened).led(say, differ=True)
     warm = [marginalised(one, tried.scatter) for one in tried.expansions()]
     ratio = run_inflation(Pooled.of(warm, tried.V), left_out(warm, tried.V), of)
     chance = independence(ratio, count)
@@ -271,6 +267,12 @@ def in_sessions(found: Sequence[Expansion], scatter: np.ndarray, counts: Sequenc
     runs, ends = [marginalised(one, scatter) for one in found], np.cumsum(counts)
     return [Pooled.of(runs[end - count : end], np.zeros(0)).parabola()
             for count, end in zip(counts, ends, strict=True)]  # fmt: skip
+
+
+def level_scatter(found: Sequence[Expansion]) -> float:
+    """1 sigma from run to run of the logarithm of the mean square that is left."""
+    logs = np.log([one.squares.sum() / max(1, one.samples.sum()) for one in found])
+    return float(logs.std(ddof=1)) if len(logs) > 1 else 0.5
 
 
 def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
