@@ -1,6 +1,7 @@
 """A vehicle of one's own from its skeleton: checked, identified, diagnosed, watched; nothing of the tree touched."""
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
@@ -161,6 +162,13 @@ def days(pool):
     done = glider("identify", *(f"day{n}" for n in range(5)), "--vehicle", "gyro.toml", "--out", "days", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, case
+
+
+def test_labels_that_act_alike_differ_alike_from_run_to_run_in_whatever_unit(days):
+    folder, _ = days
+    kept = tomllib.loads((folder / "days" / "identified.toml").read_text())["identified"]["label_scatter"]
+    assert kept["thrust_offset"] == pytest.approx(kept["weight_in_water"], rel=0.2)
+    assert kept["heave_push"] * 12.0 == pytest.approx(kept["weight_in_water"], rel=0.2)
 
 
 @pytest.mark.parametrize("heavier", [0.0, 0.6], ids=["healthy", "heavier"])

@@ -15,7 +15,7 @@ from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import marginalised
 from glider.tools.own.effects import FORM, NOISE, OUTPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.excess_noise import NOISE_SIZES
-from glider.tools.own.hierarchy import ChannelErrors, Expansion
+from glider.tools.own.hierarchy import LEAST_REACH, ChannelErrors, Expansion
 
 NONE, UNKNOWN = "none", "unknown"
 SIZES = NOISE_SIZES  # tolerances, rms over the windows
@@ -27,7 +27,6 @@ ANOTHER = 0.1  # that a further effect stands beside one
 STRANGE = 0.1  # that more is left than a hypothesis says
 FORM_SHARES = (0.0, HEALTHY.form_error)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
-LEAST_REACH = 1e-4  # tolerances a spread
 
 
 @dataclass(frozen=True)

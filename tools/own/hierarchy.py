@@ -21,6 +21,8 @@ STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step ma
 PARTS = 1, 4  # of a window, in each of which errors may be the same
 LEVEL_ROUNDS, LEVEL_AT_REST = 30, 1e-9  # of Newton's method for log r
 UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
+LEAST_REACH = 1e-4  # tolerances a spread: less is not seen
+LONGEST_MOVE, LONGEST_REACH = 4.0, 4.0  # spreads of a number a round; tolerances, where these are more
 
 
 @dataclass
@@ -42,6 +44,12 @@ class Expansion(Parabola):
         slope[columns], block = self.slope[columns], np.ix_(columns, columns)
         curvature[block] = self.curvature[block]
         return replace(self, slope=slope, curvature=curvature)
+
+    def weighted(self, share: float) -> "Expansion":
+        """The same with its squared errors counted by a share."""
+        return replace(self, value=share * self.value, slope=share * self.slope, curvature=share * self.curvature,
+                       squares=share * self.squares, gap_squares=share * self.gap_squares,
+                       blocks=share**2 * self.blocks, diagonal=share**2 * self.diagonal)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -123,6 +131,12 @@ def expand(
     )  # fmt: skip
 
 
+def room(reach: np.ndarray) -> np.ndarray:
+    """Spreads (k,) that a round may move numbers by, of which one spread moves the channels by `reach` (k,) tolerances,
+    rms."""
+    return np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(reach, LEAST_REACH))
+
+
 def multiples_of_pushes(
     declared: Declaration, effects: Sequence[Effect], driven: np.ndarray
 ) -> dict[int, tuple[int, float]]:
@@ -196,11 +210,14 @@ class RunLevel:
         apart = (level / self.scatter) ** 2 if level else 0.0
         return squares * float(np.exp(-level)) + count * level + apart
 
+    def share(self, one: Expansion) -> float:
+        """1 / r of a run, tempered: by how much its squared errors count."""
+        return float(np.exp(-self.log_level(one.value, self.count(one))))
+
     def of(self, one: Expansion) -> Expansion:
         """A run, tempered, at its own level: a parabola that is nowhere below what it has."""
-        count = self.count(one)
-        share = float(np.exp(-self.log_level(one.value, count)))
-        return replace(one, value=self.value(one.value, count), slope=share * one.slope,
+        share = self.share(one)
+        return replace(one, value=self.value(one.value, self.count(one)), slope=share * one.slope,
                        curvature=share * one.curvature)  # fmt: skip
 
 

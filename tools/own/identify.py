@@ -43,9 +43,11 @@ from glider.tools.own.runs_fit import (
     USUAL_SCATTER,
     RunsFit,
     left_by,
+    level_scatter,
 )
 
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
+USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 
 
@@ -137,10 +139,13 @@ def identify(
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
-    fit_levels(observer, say)
     scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
     errors = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales)))
-    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter).led(say)
+    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter)
+    fit = fit.led_at_levels(say)
+    fit_levels(observer, [moved(declared, observer.point, nuisance, row) for row in fit.own],
+               fit.errors.scales, say)  # fmt: skip
+    fit = fit.led_with_differences(say)
     fit, components, notes = with_components(fit, vehicles, say)
     values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
     fit.errors = left_by(fit.expansions(), fit.errors)
@@ -193,7 +198,7 @@ def with_components(
     )
     say(f"errors of windows: {learned.said(declared)}")
     whitened = replace(fit.errors, whitenings=[Whitening(one, learned) for one in found])
-    tried = replace(fit, errors=whitened).led(say, differ=True)
+    tried = replace(fit, errors=whitened).led_with_differences(say)
     warm = [marginalised(one, tried.scatter) for one in tried.expansions()]
     ratio = run_inflation(Pooled.of(warm, tried.V), left_out(warm, tried.V), of)
     chance = independence(ratio, count)
@@ -228,10 +233,11 @@ def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tup
     """How far each label alone differs from run to run beside the numbers of runs: what healthy runs show of it.
 
     Every run is seen as one that is asked about later: by a vehicle identified from the others, as certain as these
-    make it. 1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`.
+    make it. 1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`
+    for what it does in tolerances, so that labels that act alike differ alike, in whatever unit.
     """
-    labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
-    every = [*labels, *pushes(observer.declared), *form_errors(observer.declared)]
+    labels = [*standard_effects(observer.declared, observer.runs, observer.tolerances), *pushes(observer.declared)]
+    every = [*labels, *form_errors(observer.declared)]
     into = placed(nuisance, every)
     about = []
     for n, without_it in enumerate(others):
@@ -242,11 +248,14 @@ def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tup
         about.append(without(one, root))
     slopes = np.array([-one.offset for one in about])[:, : len(labels)]
     precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
-    total = 1.0 + LABEL_SCATTERS[:, None, None] ** 2 * precisions  # (grid, runs, labels)
-    nat = 0.5 * (slopes**2 * LABEL_SCATTERS[:, None, None] ** 2 / total - np.log(total)).sum(axis=1)
-    usual = USUAL_SCATTER if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_SCATTER
+    reach = np.sqrt(np.mean([one.reach for one in about], axis=0))[: len(labels)]
+    reach = np.maximum(reach, USUAL_LABEL / USUAL_OWN_SCATTER)
+    scatters = LABEL_SCATTERS[:, None] / reach  # (grid, labels) spreads
+    total = 1.0 + scatters[:, None] ** 2 * precisions  # (grid, runs, labels)
+    nat = 0.5 * (slopes**2 * scatters[:, None] ** 2 / total - np.log(total)).sum(axis=1)
+    usual = USUAL_LABEL if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_LABEL
     prior = log_prior(LABEL_SCATTERS[:, None] ** 2, usual**2)
-    return labels, LABEL_SCATTERS[np.argmax(nat + prior, axis=0)]
+    return labels, scatters[np.argmax(nat + prior, axis=0), np.arange(len(labels))]
 
 
 def learn_sessions(
@@ -267,12 +276,6 @@ def in_sessions(found: Sequence[Expansion], scatter: np.ndarray, counts: Sequenc
     runs, ends = [marginalised(one, scatter) for one in found], np.cumsum(counts)
     return [Pooled.of(runs[end - count : end], np.zeros(0)).parabola()
             for count, end in zip(counts, ends, strict=True)]  # fmt: skip
-
-
-def level_scatter(found: Sequence[Expansion]) -> float:
-    """1 sigma from run to run of the logarithm of the mean square that is left."""
-    logs = np.log([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-    return float(logs.std(ddof=1)) if len(logs) > 1 else 0.5
 
 
 def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:

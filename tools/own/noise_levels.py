@@ -1,23 +1,54 @@
 """Noise of sensors and of the model from the filter's likelihood along healthy runs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from glider.tools.own.observer import Observer
+from glider.tools.own.observer import ModelPoint, Observer
 
 LEVEL_ROWS, PLAIN_ROWS = 3_000, 600  # of runs from which noise levels are found: compiled, plain Python
 LEVEL_STEPS = (0.8, 0.4)  # e-folds
 MAX_LEVEL_SHIFT = 4.0  # e-folds from the file's noise, at most
+PARTS_ASKED = 1.0, 0.75, 0.5, 0.25, 0.0  # of what the filter's likelihood asks for, in e-folds
+
+Levels = dict[tuple[str, int], float]  # e-folds of a noise's density, or of an output's 1 sigma, by place
 
 
-def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
-    """Noise of sensors and of the model by the filter's likelihood: coordinate steps, shortened.
+def fit_levels(
+    observer: Observer, points: Sequence[ModelPoint], scales: np.ndarray, say: Callable[[str], None]
+) -> None:
+    """Noise of sensors and of the model by the filter's likelihood at every run's point: coordinate steps, shortened.
 
-    They say how far the filter that finds where windows begin trusts the model; no evidence hangs on them.
+    They say how far the filter that finds where windows begin trusts the model; no evidence hangs on them. The filter
+    takes what errors have in common for noise as well, and one that trusts nothing is lost: of what it asks for counts
+    the part by which windows are predicted best, each run by the logarithm of its errors in units of `scales` (y,).
     """
     if observer.vehicle.level == 0:
         return
+    declared = observer.declared
+    asked = _most_probable(observer, points)
+
+    def left(share: float) -> float:
+        gaps = [observer.gaps(n, _at(point, asked, share), observer.horizon) / scales for n, point in enumerate(points)]
+        return float(np.mean([np.log(np.nanmean(one**2)) for one in gaps]))
+
+    share = min(PARTS_ASKED, key=left)
+    observer.point = _at(observer.point, asked, share)
+    said = [f"{declared.noises[k].name if what == 'density' else declared.outputs[k].name} x{np.exp(share * shift):.2g}"
+            for (what, k), shift in asked.items() if abs(share * shift) > 0.3]  # fmt: skip
+    say(f"noise levels: {', '.join(said) or 'as the file has them'}")
+
+
+def _at(point: ModelPoint, levels: Levels, share: float = 1.0) -> ModelPoint:
+    """A model with its noises at a share of levels."""
+    found = point.copy()
+    for (what, k), shift in levels.items():
+        getattr(found, what)[k] *= np.exp(share * (shift if what == "density" else 2.0 * shift))
+    return found
+
+
+def _most_probable(observer: Observer, points: Sequence[ModelPoint]) -> Levels:
+    """Levels by the filter's likelihood along the shortest runs."""
     declared, budget = observer.declared, LEVEL_ROWS if observer.vehicle.kernels.compiled else PLAIN_ROWS
     used, rows = list[int](), 0
     for n in sorted(range(len(observer.runs)), key=lambda n: len(observer.runs[n].t)):
@@ -30,12 +61,7 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
     level = dict.fromkeys(free, 0.0)
 
     def cost() -> float:
-        total = 0.0
-        for n in used:
-            point = observer.point.copy()
-            for (what, k), shift in level.items():
-                getattr(point, what)[k] *= np.exp(shift if what == "density" else 2.0 * shift)
-            total += observer.filter(n, point).value
+        total = sum(observer.filter(n, _at(points[n], level)).value for n in used)
         return total + sum(shift**2 for shift in level.values()) / MAX_LEVEL_SHIFT**2 * 4.0
 
     best = cost()
@@ -53,8 +79,4 @@ def fit_levels(observer: Observer, say: Callable[[str], None]) -> None:
                         break
                 if moved_any:
                     break
-    for (what, k), shift in level.items():
-        getattr(observer.point, what)[k] *= np.exp(shift if what == "density" else 2.0 * shift)
-    said = [f"{declared.noises[k].name if what == 'density' else declared.outputs[k].name} x{np.exp(shift):.2g}"
-            for (what, k), shift in level.items() if abs(shift) > 0.3]  # fmt: skip
-    say(f"noise levels: {', '.join(said) or 'as the file has them'}")
+    return level

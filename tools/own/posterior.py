@@ -17,7 +17,6 @@ from scipy.stats import norm
 from glider.tools.inference.pooled import Pooled, run_values
 from glider.tools.own.decision import (
     FORM_SHARES,
-    LEAST_REACH,
     SIZES,
     Deviations,
     Healthy,
@@ -30,14 +29,13 @@ from glider.tools.own.decision import (
 )
 from glider.tools.own.effects import FORM, NOISE, PUSH, moved
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
-from glider.tools.own.hierarchy import Expansion, RunLevel, expand, followed
+from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room
 from glider.tools.own.observer import Observer
 
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
-BEAM, MOST_EFFECTS, LONGEST_MOVE = 6, 3, 4.0
+BEAM, MOST_EFFECTS = 6, 3
 ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all others begin
 WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
-LONGEST_REACH = 4.0  # tolerances that a round's move of one number may do at most, where that is more
 STRONG, STRONG_LEFT, STRONG_ROWS = (
     (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
     1.5,
@@ -160,14 +158,14 @@ class Engine:
     ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
         """Values led on from where runs are expanded by the derivatives there, V (k, k) the prior: shared (k,), own
         (runs, k), and by how much -2 log posterior fell, flown at every place."""
-        room = np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(self.reach, LEAST_REACH))  # (k,) spreads
+        most = room(self.reach)
         columns = self.columns(places)
         cost, gained, share = sum(one.value for one in found) + by.prior(shared, own, places), 0.0, 1.0
         for _ in range(WAY):
             target = np.clip(Pooled.of(by.marginal(found), V).mean(), self.low, self.high)
-            step = np.clip(target - shared, -room, room)
+            step = np.clip(target - shared, -most, most)
             of_runs = np.array([run_values(one, shared + step, by.scatter) for one in found])
-            of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -room, room)
+            of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -most, most)
             tried, theirs = shared + share * step, own + share * of_runs
             there = self._all_followed(theirs, columns, found)
             gain = cost - sum(one.value for one in there) - by.prior(tried, theirs, places)

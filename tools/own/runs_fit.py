@@ -1,6 +1,6 @@
 """Healthy runs fitted: what they share, what each has of its own, how they differ, to windows flown open loop."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,14 +10,17 @@ from glider.tools.own.effects import Effect, moved
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, inflation
 from glider.tools.own.observer import Observer
 
-ROUNDS, SHARED_ROUNDS = 40, 10  # at most; of them until it is learned how runs differ
+SHARED_ROUNDS, ROUNDS = 10, 40  # at most, until it is learned how runs differ, and from then on
 FORM_ROUNDS = 2
 SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 LABEL_SCATTERS = np.geomspace(0.005, 20.0, 60)  # spreads: candidates for a label's scatter
-LONGEST_MOVE, SHARES = 2.0, (1.0, 0.4, 0.1)  # spreads a round; of a step, until the exact posterior gains
-LEAST_DAMPING, MOST_DAMPING = 0.01, 1e6  # of the curvature, in spreads
+SHARES = 1.0, 0.4, 0.1  # of a step of runs' own values, until the exact posterior gains
+LEAST_DAMPING, MORE_DAMPING, MOST_DAMPING = 0.01, 4.0, 1e6  # of the curvature, number by number; times, a step
+MOST_MOVED = 2.0  # spreads of a number a round
+DAMPINGS = 8  # tried at most, from the least on that keeps steps short
+UNSEEN = 1e-3  # curvature that is damped where runs say nothing
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
 LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
@@ -43,43 +46,76 @@ class RunsFit:
         return [expand(self.observer, n, self.nuisance, row, self.errors, horizon, keep)
                 for n, row in enumerate(self.own)]  # fmt: skip
 
-    def led(self, say: Callable[[str], None], differ: bool = False) -> "RunsFit":
-        """The fit led on until it rests; differ: it is learned at once how runs differ, else what they share first."""
-        fit, learned, many = replace(self), 0, len(self.own) >= MIN_SCATTER_RUNS
-        for round_ in range(ROUNDS):
+    def led_at_levels(self, say: Callable[[str], None]) -> "RunsFit":
+        """The fit led on until it rests in what runs share, each run at its own level of errors.
+
+        A model that is far off may tumble where the vehicle did not. Of a run whose errors all are larger by a factor
+        of its own the logarithm counts, so that the other runs lead on.
+        """
+        fit = replace(self)
+        for _ in range(SHARED_ROUNDS):
+            weighted, warm, level = fit.at_levels()
+            if fit.stepped(warm, weighted, level, say):
+                break
+        return fit
+
+    def led_with_differences(self, say: Callable[[str], None]) -> "RunsFit":
+        """The fit led on until it rests, how runs differ learned, and what the form of the model cannot do."""
+        fit, learned = replace(self), 0 if len(self.own) >= MIN_SCATTER_RUNS else SCATTER_ROUNDS
+        for _ in range(ROUNDS):
             found = fit.expansions()
-            *_, eta = inflation(found)
-            warm = [one.tempered(eta) for one in found]
-            if differ and learned < SCATTER_ROUNDS:
+            level = RunLevel(fit.errors, float(inflation(found)[-1]), 0.0)
+            warm = [one.tempered(level.eta) for one in found]
+            if learned < SCATTER_ROUNDS:
                 fit.V = with_form_errors([marginalised(one, fit.scatter) for one in warm], fit.V, fit.nuisance)
                 scatter = learn_scatter(warm, fit.V, fit.usual)
                 fit.scatter = scatter if learned == 0 else np.sqrt(fit.scatter * scatter)
                 learned += 1
-            search = LineSearch(fit.observer, fit.nuisance, warm, fit.scatter, eta, fit.V, fit.limits, fit.errors,
-                                fit.observer.horizon)  # fmt: skip
-            step = damped_step(Pooled.of([marginalised(one, fit.scatter) for one in warm], fit.V), fit.values)
-            fit.values, fit.own, gain = search.along(fit.values, fit.own, step)
-            before, scales = fit.errors.scales, left_by(found, fit.errors).scales
-            fit.errors = replace(fit.errors, scales=scales)  # channels' own inflation is for what is asked later
-            left = np.sqrt(np.mean(scales**2))
-            say(f"round {round_ + 1}: gain {gain:.1f}, {left:.2f} tolerances left, inflation {eta:.0f}")
-            if gain < CONVERGED_GAIN and np.abs(np.log(scales / before)).max() < CONVERGED_SCALE:
-                if learned == SCATTER_ROUNDS or not many:
-                    break
-                differ = True
-            differ = differ or (round_ == SHARED_ROUNDS and many)
+            if fit.stepped(warm, found, level, say) and learned == SCATTER_ROUNDS:
+                break
         return fit
 
+    def at_levels(self) -> tuple[list[Expansion], list[Expansion], RunLevel]:
+        """Every run at its own level of errors, as it is and tempered."""
+        found = self.expansions()
+        scatter = level_scatter(found)
+        plain = RunLevel(self.errors, 1.0, scatter)
+        weighted = [one.weighted(plain.share(one)) for one in found]
+        level = RunLevel(self.errors, float(inflation(weighted)[-1]), scatter)
+        return weighted, [level.of(one.tempered(level.eta)) for one in found], level
 
-def damped_step(pooled: Pooled, values: np.ndarray) -> np.ndarray:
-    """Step (k,) to the most probable shared values, damped as Levenberg has it until no value moves LONGEST_MOVE."""
-    damping = 0.0
-    while True:
-        near = replace(pooled, H=pooled.H + damping * np.eye(len(values)), r=pooled.r + damping * values)
-        step = near.mean() - values
-        if np.abs(step).max(initial=0.0) <= LONGEST_MOVE or damping > MOST_DAMPING:
-            return np.clip(step, -LONGEST_MOVE, LONGEST_MOVE)
-        damping = max(4.0 * damping, LEAST_DAMPING)
+    def stepped(
+        self, warm: Sequence[Expansion], found: Sequence[Expansion], level: RunLevel, say: Callable[[str], None]
+    ) -> bool:
+        """One step, in place, by runs tempered (`warm`); what they leave counts as in `found`. Whether it rests."""
+        search = LineSearch(self.observer, self.nuisance, warm, self.scatter, level.eta, self.V, self.limits,
+                            self.errors, self.observer.horizon, level=level)  # fmt: skip
+        pooled = Pooled.of([marginalised(one, self.scatter) for one in warm], self.V)
+        self.values, self.own, gain = search.along(self.values, self.own, pooled)
+        before, scales = self.errors.scales, left_by(found, self.errors).scales
+        self.errors = replace(self.errors, scales=scales)  # channels' own inflation is for what is asked later
+        left = np.sqrt(np.mean(scales**2))
+        say(f"gain {gain:.1f}, {left:.2f} tolerances left, inflation {level.eta:.0f}")
+        return bool(gain < CONVERGED_GAIN and np.abs(np.log(scales / before)).max() < CONVERGED_SCALE)
+
+
+def level_scatter(found: Sequence[Expansion]) -> float:
+    """1 sigma from run to run of the logarithm of the mean square that is left."""
+    logs = np.log([one.squares.sum() / max(1, one.samples.sum()) for one in found])
+    return float(logs.std(ddof=1)) if len(logs) > 1 else 0.5
+
+
+def damped_steps(pooled: Pooled, values: np.ndarray, most: np.ndarray) -> Iterator[np.ndarray]:
+    """Steps (k,) to the most probable shared values, damped as Marquardt has it more and more, from that on in which no
+    value moves further than `most` (k,)."""
+    damping, of = 0.0, np.diag(pooled.H) + UNSEEN
+    for _ in range(DAMPINGS):
+        while True:
+            near = replace(pooled, H=pooled.H + damping * np.diag(of), r=pooled.r + damping * of * values)
+            step, damping = near.mean() - values, max(MORE_DAMPING * damping, LEAST_DAMPING)
+            if (np.abs(step) <= most).all() or damping > MOST_DAMPING:
+                break
+        yield np.clip(step, -most, most)
 
 
 def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequence[Effect]) -> np.ndarray:
@@ -118,7 +154,7 @@ class LineSearch:
 
     observer: Observer
     nuisance: list[Effect]
-    warm: list[Expansion]
+    warm: Sequence[Expansion]
     scatter: np.ndarray
     eta: float
     V: np.ndarray
@@ -139,27 +175,31 @@ class LineSearch:
         squares = float(self.errors.misfit(flown, error)) / self.eta
         return squares if self.level is None else self.level.value(squares, self.level.count(self.warm[n]))
 
-    def along(self, values: np.ndarray, own: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Values, runs' own values and the gain of a step, shortened until the exact posterior gains."""
+    def along(self, values: np.ndarray, own: np.ndarray, pooled: Pooled | None) -> tuple[np.ndarray, np.ndarray, float]:
+        """Values, runs' own values and the gain of a step, damped until the exact posterior gains; without the runs
+        pooled, of their own values alone."""
 
-        def at(share: float, of_own: float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
-            x = np.clip(values + share * step, *self.limits)
+        most = np.full(len(values), MOST_MOVED)
+
+        def at(step: np.ndarray, of_own: float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
+            x = np.clip(values + step, *self.limits)
             target = np.array([run_values(one, x, self.scatter) for one in self.warm])
-            theirs = own + of_own * np.clip(target - own, -LONGEST_MOVE, LONGEST_MOVE)
+            theirs = own + of_own * np.clip(target - own, -most, most)
             theirs = np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
             return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
 
         here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
         stay = here
         for of_own in SHARES:
-            tried = at(0.0, of_own)
+            tried = at(np.zeros_like(values), of_own)
             if tried[0] < stay[0]:
                 stay = tried
                 break
-        if not step.any():
-            return stay[1], stay[2], 0.0
-        for share in SHARES:
-            tried = at(share)
-            if tried[0] < stay[0]:
-                return tried[1], tried[2], stay[0] - tried[0]
-        return stay[1], stay[2], 0.0
+        best = stay
+        for step in damped_steps(pooled, values, most) if pooled is not None else ():
+            tried = at(step)
+            if tried[0] < best[0]:
+                best = tried
+            elif best is not stay:
+                break
+        return best[1], best[2], stay[0] - best[0]

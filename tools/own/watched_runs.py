@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glider.tools.inference.pooled import Pooled, learn_scatter, run_values
-from glider.tools.own.decision import LEAST_REACH, Healthy
-from glider.tools.own.hierarchy import Expansion
+from glider.tools.own.decision import Healthy
+from glider.tools.own.hierarchy import LONGEST_MOVE, Expansion, room
 from glider.tools.own.observer import Observer
-from glider.tools.own.posterior import AT_REST, LONGEST_MOVE, LONGEST_REACH, Engine
-from glider.tools.own.runs_fit import CONVERGED_GAIN, MIN_SCATTER_RUNS, SCATTER_ROUNDS, LineSearch, damped_step
+from glider.tools.own.posterior import AT_REST, Engine
+from glider.tools.own.runs_fit import CONVERGED_GAIN, MIN_SCATTER_RUNS, SCATTER_ROUNDS, LineSearch
 from glider.tools.own.sessions import Session, SessionRuns, of_another
 from glider.tools.own.watched import Event
 
@@ -61,7 +61,7 @@ class WatchedRuns(Engine):
             pooled = Pooled.of(self.together.marginal(found), V)
             search = LineSearch(self.observer, healthy.effects, found, self.together.scatter, healthy.eta, V,
                                 (self.low, self.high), healthy.errors, self.horizon, 0, self.level)  # fmt: skip
-            shared, own, gain = search.along(shared, own, damped_step(pooled, shared))
+            shared, own, gain = search.along(shared, own, pooled)
             if gain < CONVERGED_GAIN and round_ >= SCATTER_ROUNDS:
                 break
         later = [self.about(n, shared, shared, columns).at for n in range(self.learned, self.count)]
@@ -84,7 +84,7 @@ class WatchedRuns(Engine):
             found = self.expansion_of(n, own, free)
             search = LineSearch(self.observer, healthy.effects, [found], scatter, healthy.eta, self.together.V,
                                 (self.low, self.high), healthy.errors, self.horizon, n, self.level)  # fmt: skip
-            _, (moved_own,), _ = search.along(around, own[None], np.zeros(self.k))
+            _, (moved_own,), _ = search.along(around, own[None], None)
             if np.abs(moved_own - own).max() < CONVERGED_OWN:
                 break
             own = moved_own
@@ -196,8 +196,8 @@ class WatchedRuns(Engine):
                 continue
             best = Led(sessions, pooled, size, density)
             mean, sd = target(pooled, size)
-            room = max(LONGEST_MOVE, LONGEST_REACH / max(self.reach[label], LEAST_REACH))
-            step = float(np.clip(np.clip(mean, self.low[label], self.high[label]) - size, -room, room))
+            most = room(self.reach)[label]
+            step = float(np.clip(np.clip(mean, self.low[label], self.high[label]) - size, -most, most))
             at_rest = abs(step) < sd if at_rest or gain < AT_REST else new is None and abs(step) < 0.1 * sd
             if at_rest and anew:
                 break

@@ -48,9 +48,6 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.mark.xfail(
-    reason="the search for what runs share stops where one flight's model tumbles", strict=True, raises=AssertionError
-)
 def test_flights_in_which_the_model_tumbles_do_not_hold_up_the_others(folder):
     runs = flights(module_of(folder / "tumbler.py"), np.random.default_rng(7), 6)
     found = identify(load_own(folder / "tumbler.toml"), [runs])
