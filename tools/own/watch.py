@@ -149,12 +149,14 @@ class Watch(WatchedRuns):
         return self.observer.runs[n].name
 
     def compared(self, span: tuple[int, int], sessions: Sequence[Session], scores: np.ndarray) -> list[Refit]:
-        """Labels over a span, each refitted where it leads."""
+        """Labels over a span, refitted where each leads; others in the place of the best until it stays the best."""
         starts, runs = {int(k): 0.0 for k in np.argsort(scores)[::-1][:REFITTED]}, range(*span)
         if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
             starts |= dict(self.strong_sizes(runs)[:REFITTED])
-        found = [self.refit(span, k, start, sessions) for k, start in starts.items()]
-        return found + self.swapped(max(found, key=lambda one: one.score), found)
+        found, best = [self.refit(span, k, start, sessions) for k, start in starts.items()], None
+        while best is not (best := max(found, key=lambda one: one.score)):
+            found += self.swapped(best, found)
+        return found
 
     def decided(self, found: Sequence[Refit]) -> tuple[Refit, dict[str, float]]:
         """The event that is most probable of labels over spans, one of which it is, and the chance of each label: a
