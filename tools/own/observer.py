@@ -98,7 +98,7 @@ class Observer:
         early = (run.t >= run.t[row]) & (run.t - run.t[row] <= FIRST_SECONDS)
         for k, one in enumerate(self.declared.outputs):
             gain, bias = point.reading[0, k], point.reading[1, k]
-            seen = np.flatnonzero(np.isfinite(run.outputs[:, k]) & early)
+            seen = np.flatnonzero(np.isfinite(run.outputs[:, k]) & early & (gain != 0.0))
             values = (run.outputs[seen, k] - bias) / gain
             if one.angle:
                 values = np.unwrap(values)

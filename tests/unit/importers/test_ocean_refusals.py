@@ -1,5 +1,6 @@
 """A cut, a foreign, an empty and a mixed-up file are named in one line, and nothing is imported."""
 
+import gzip
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -8,10 +9,13 @@ import numpy as np
 import pytest
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.importers.ocean import netcdf
 from glider.tools.data.importers.ocean.og1 import read_og1
 from tests.support import ocean_files
 from tests.support.commands import glider
 from tests.support.ocean_files import START, flight
+
+DAMAGED = Path(__file__).parents[2] / "data" / "damaged"
 
 
 def refused(kind: str, files: list[Path], out: Path, *more: object) -> str:
@@ -74,6 +78,15 @@ def test_bytes_overwritten_in_the_middle(tmp_path, seed):
         read_og1(path, None)
     assert str(error.value).startswith(f"{path}: ")
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_damage_in_which_a_library_finds_no_end(tmp_path, monkeypatch):
+    """A mission of `ocean_files.og1` with byte 2704 changed."""
+    path = tmp_path / "mission.nc"
+    path.write_bytes(gzip.decompress((DAMAGED / "read_for_ever.nc.gz").read_bytes()))
+    monkeypatch.setattr(netcdf, "LEAST_READ_S", 1)
+    with pytest.raises(InputError, match=r"mission\.nc: .*damaged"):
+        read_og1(path, None)
 
 
 @pytest.mark.parametrize("kind", WRITERS)

@@ -1,5 +1,9 @@
 """NetCDF files, classic and of version 4, as variables with strict units."""
 
+import multiprocessing
+import resource
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +14,7 @@ from glider.tools.data.files import require_file
 from glider.tools.data.importers.ocean.segment import require_unit
 
 MAX_FILE_BYTES = 4_000_000_000
+LEAST_READ_S, READ_BYTES_PER_S = 5, 1_000_000  # of one processor, at most, that reading a file takes
 CLASSIC, HDF5 = b"CDF", b"\x89HDF\r\n\x1a\n"
 METRES = dict.fromkeys(("m", "meters", "metres", "meter", "metre"), 1.0)
 DBAR = dict.fromkeys(("dbar", "decibar", "decibars"), 1.0)
@@ -100,20 +105,32 @@ def _opened(path: Path) -> Any:
     engine = "h5netcdf" if begin == HDF5 else "scipy"
     try:
         if engine == "h5netcdf":
-            _walk(path)
+            with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as reader:
+                reader.submit(_read_all, path).result()
         with xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False) as dataset:
             return dataset.load()
-    except InputError:
-        raise
+    except BrokenProcessPool:
+        raise InputError("damaged: reading it fails or does not end", source=path) from None
     # What the libraries raise on damage is not said by them: OSError, ValueError, struct.error, KeyError, TypeError.
     except Exception as error:
         what = (str(error) or repr(error)).splitlines()[0].strip("'\"")
         raise InputError(f"cut or damaged: {what}", source=path) from None
 
 
-def _walk(path: Path) -> None:
-    """Look at all objects of a file of version 4: h5py's errors are clean, h5netcdf leaves half-opened files behind."""
+def _read_all(path: Path) -> None:
+    """Read all of a file of version 4, in a process of its own: on damage HDF5 may read for ever, or die.
+
+    h5py's errors are clean; h5netcdf would leave half-opened files behind.
+    """
     import h5py
 
+    seconds = LEAST_READ_S + path.stat().st_size // READ_BYTES_PER_S
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     with h5py.File(path) as file:
-        file.visititems(lambda _name, _object: None)
+        file.visititems(_read)
+
+
+def _read(_name: str, found: Any) -> None:
+    """Read an object of a file whole."""
+    if hasattr(found, "shape"):
+        found[()]
