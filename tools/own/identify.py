@@ -197,15 +197,14 @@ def with_components(
         found, Components(np.sqrt(observer.point.variance) / observer.tolerances, each, each, 1.0)
     )
     say(f"errors of windows: {learned.said(declared)}")
-    whitened = replace(fit.errors, whitenings=[Whitening(one, learned) for one in found])
-    tried = replace(fit, errors=whitened).led_with_differences(say)
-    warm = [marginalised(one, tried.scatter) for one in tried.expansions()]
-    ratio = run_inflation(Pooled.of(warm, tried.V), left_out(warm, tried.V), of)
+    tried = replace(fit, errors=replace(fit.errors, whitenings=[Whitening(one, learned) for one in found]))
+    whitened = [marginalised(one, tried.scatter) for one in tried.expansions()]
+    ratio = run_inflation(Pooled.of(whitened, tried.V), left_out(whitened, tried.V), of)
     chance = independence(ratio, count)
     say(f"runs left out move the values by {np.sqrt(ratio):.1f} times what independent errors would")
     notes = [f"errors of windows are what the model's noises make: probability {chance:.2f}"]
     say(notes[0])
-    return (tried, learned, notes) if chance > 0.5 else (fit, None, notes)
+    return (tried.led_with_differences(say), learned, notes) if chance > 0.5 else (fit, None, notes)
 
 
 def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:
