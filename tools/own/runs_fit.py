@@ -105,17 +105,17 @@ def level_scatter(found: Sequence[Expansion]) -> float:
     return float(logs.std(ddof=1)) if len(logs) > 1 else 0.5
 
 
-def damped_steps(pooled: Pooled, values: np.ndarray, most: np.ndarray) -> Iterator[np.ndarray]:
+def damped_steps(pooled: Pooled, values: np.ndarray) -> Iterator[np.ndarray]:
     """Steps (k,) to the most probable shared values, damped as Marquardt has it more and more, from that on in which no
-    value moves further than `most` (k,)."""
+    value moves further than MOST_MOVED."""
     damping, of = 0.0, np.diag(pooled.H) + UNSEEN
     for _ in range(DAMPINGS):
         while True:
             near = replace(pooled, H=pooled.H + damping * np.diag(of), r=pooled.r + damping * of * values)
             step, damping = near.mean() - values, max(MORE_DAMPING * damping, LEAST_DAMPING)
-            if (np.abs(step) <= most).all() or damping > MOST_DAMPING:
+            if np.abs(step).max(initial=0.0) <= MOST_MOVED or damping > MOST_DAMPING:
                 break
-        yield np.clip(step, -most, most)
+        yield np.clip(step, -MOST_MOVED, MOST_MOVED)
 
 
 def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequence[Effect]) -> np.ndarray:
@@ -179,12 +179,10 @@ class LineSearch:
         """Values, runs' own values and the gain of a step, damped until the exact posterior gains; without the runs
         pooled, of their own values alone."""
 
-        most = np.full(len(values), MOST_MOVED)
-
         def at(step: np.ndarray, of_own: float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
             x = np.clip(values + step, *self.limits)
             target = np.array([run_values(one, x, self.scatter) for one in self.warm])
-            theirs = own + of_own * np.clip(target - own, -most, most)
+            theirs = own + of_own * np.clip(target - own, -MOST_MOVED, MOST_MOVED)
             theirs = np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
             return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
 
@@ -196,7 +194,7 @@ class LineSearch:
                 stay = tried
                 break
         best = stay
-        for step in damped_steps(pooled, values, most) if pooled is not None else ():
+        for step in damped_steps(pooled, values) if pooled is not None else ():
             tried = at(step)
             if tried[0] < best[0]:
                 best = tried

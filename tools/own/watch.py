@@ -154,7 +154,8 @@ class Watch(WatchedRuns):
         if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
             starts |= dict(self.strong_sizes(runs)[:REFITTED])
         found, best = [self.refit(span, k, start, sessions) for k, start in starts.items()], None
-        while best is not (best := max(found, key=lambda one: one.score)):
+        while (leading := max(found, key=lambda one: one.score)) is not best:
+            best = leading
             found += self.swapped(best, found)
         return found
 
