@@ -36,9 +36,9 @@ from glider.tools.own.operating_points import input_shares
 from glider.tools.own.persistence import channel_scores, persistence
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.runs_fit import (
-    LABEL_SCATTERS,
     LEAST_SCALE,
     MIN_SCATTER_RUNS,
+    SCATTERS,
     USUAL_OWN_SCATTER,
     USUAL_SCATTER,
     RunsFit,
@@ -249,11 +249,11 @@ def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tup
     precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
     reach = np.sqrt(np.mean([one.reach for one in about], axis=0))[: len(labels)]
     reach = np.maximum(reach, USUAL_LABEL / USUAL_OWN_SCATTER)
-    scatters = LABEL_SCATTERS[:, None] / reach  # (grid, labels) spreads
+    scatters = SCATTERS[:, None] / reach  # (grid, labels) spreads
     total = 1.0 + scatters[:, None] ** 2 * precisions  # (grid, runs, labels)
     nat = 0.5 * (slopes**2 * scatters[:, None] ** 2 / total - np.log(total)).sum(axis=1)
     usual = USUAL_LABEL if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_LABEL
-    prior = log_prior(LABEL_SCATTERS[:, None] ** 2, usual**2)
+    prior = log_prior(SCATTERS[:, None] ** 2, usual**2)
     return labels, scatters[np.argmax(nat + prior, axis=0), np.arange(len(labels))]
 
 

@@ -15,7 +15,7 @@ FORM_ROUNDS = 2
 SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
-LABEL_SCATTERS = np.geomspace(0.005, 20.0, 60)  # spreads: candidates for a label's scatter
+SCATTERS = np.geomspace(0.005, 20.0, 60)  # candidates: spreads of form errors, tolerances of labels
 SHARES = 1.0, 0.4, 0.1  # of a step of runs' own values, until the exact posterior gains
 LEAST_DAMPING, MORE_DAMPING, MOST_DAMPING = 0.01, 4.0, 1e6  # of the curvature, number by number; times, a step
 MOST_MOVED = 2.0  # spreads of a number a round
@@ -136,7 +136,7 @@ def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequen
             def score(size: float, at=at, usual=usual) -> float:
                 return kept.log_evidence(at(size)) + float(log_prior(size**2, usual**2))
 
-            V = at(max(LABEL_SCATTERS, key=score))
+            V = at(max(SCATTERS, key=score))
     return V
 
 
