@@ -118,6 +118,33 @@ def test_a_gyro_that_reads_too_much_is_its_gain(pool):
     assert first["parameters"]["r_gain"]["estimate"] == pytest.approx(0.2, abs=0.05)
 
 
+def test_a_force_that_grows_in_every_run_is_unknown(pool):
+    """Water that comes in: no label has it, the thrust's offset and the depth's drift come near."""
+    folder, case, _ = pool
+    case("leak", 6, driven=lambda n, u: u + np.linspace(0.0, 1.0, len(u))[:, None] * [1.0, 0.0])
+    answer = diagnosed(folder, "leak")
+    assert answer["verdict"] == "unknown"
+    assert answer["causes"][0]["probability"] > 0.5
+    assert answer["selected"] == []
+
+
+def test_runs_without_a_case_file_are_a_case_where_their_vehicle_is_named(pool):
+    folder, case, _ = pool
+    case("logs", 7, runs=2)
+    command = ("gap", "measure", "logs", "--vehicle", "mine.toml", "--json")
+    before = json.loads(glider(*command, cwd=folder).stdout)
+    (folder / "logs" / "case.toml").unlink()
+    assert json.loads(glider(*command, cwd=folder).stdout) == before
+    unnamed = glider("gap", "measure", "logs", cwd=folder)
+    assert unnamed.returncode == 2
+    assert "case.toml" in unnamed.stderr
+    for run in (folder / "logs").iterdir():
+        run.unlink()
+    empty = glider(*command, cwd=folder)
+    assert empty.returncode == 2
+    assert "neither case.toml nor run*.csv" in empty.stderr
+
+
 def test_a_watch_names_the_run_from_which_it_is_heavier(pool):
     folder, case, _ = pool
     case("season", 5, runs=9, theta_of=lambda n, theta: theta + np.array([0, 0.6, 0, 0, 0]) * (n >= 6))

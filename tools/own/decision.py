@@ -13,20 +13,21 @@ from scipy.special import logsumexp
 from glider.tools.inference.healthy_level import HealthyLevel
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import marginalised
-from glider.tools.own.effects import FORM, NOISE, OUTPUT, PARAMETER, PUSH, Effect
+from glider.tools.own.effects import FORM, GROWTH, NOISE, OUTPUT, PARAMETER, PUSH, UNEXPLAINED, Effect
 from glider.tools.own.excess_noise import NOISE_SIZES
 from glider.tools.own.hierarchy import LEAST_REACH, ChannelErrors, Expansion
 
 NONE, UNKNOWN = "none", "unknown"
 SIZES = NOISE_SIZES  # tolerances, rms over the windows
 # prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
-# commanded and read; a constant force that no label has, seldom
-FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1}
+# commanded and read; a force that no label has, seldom
+FAMILY_ODDS = {PARAMETER: 0.5, NOISE: 0.5, PUSH: 0.1, GROWTH: 0.1}
 DRIFT_ODDS = 0.1  # of an output, in one run: instruments drift over days, which in a run is a bias
 ANOTHER = 0.1  # that a further effect stands beside one
 STRANGE = 0.1  # that more is left than a hypothesis says
 FORM_SHARES = (0.0, HEALTHY.form_error)  # as probable before the data
 MATERIAL = 0.1  # tolerances: a smaller effect is no gap (docs/reference/gap.md)
+GROUP_MASS, MOST_GROUP = 0.9, 3  # of the probability of causes, that a group holds; labels in it that are an answer
 
 
 @dataclass(frozen=True)
@@ -121,13 +122,26 @@ def log_odds(effect: Effect) -> float:
     return float(np.log(DRIFT_ODDS if drifts else FAMILY_ODDS.get(effect.family, 1.0)))
 
 
-def usual_share(healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int) -> tuple[float, float]:
-    """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it brings too, and
-    all of that evidence, by a parabola.
+def form_variance(healthy: Healthy, reach: float, moved: float) -> float:
+    """Variance (spreads squared) of what a label seems to have, where the equations of effects beside it are not as
+    they have it: of their mean square `moved` (tolerances squared) the share that a force at one noise has (`variance`
+    in posterior.py), whichever label that looks like.
 
-    reach: tolerances that a spread of it moves the channels.
+    reach: tolerances that a spread of the label moves the channels.
     """
-    usual = healthy.usual[k] ** 2 * (healthy.session_share + 1.0 / runs)
+    forces = sum(one.family == PUSH for one in healthy.effects)
+    return HEALTHY.form_error**2 * moved / max(1, forces) / max(reach, LEAST_REACH) ** 2
+
+
+def usual_share(
+    healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int, moved: float = 0.0
+) -> tuple[float, float]:
+    """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it, and the form of
+    effects beside it, bring too, and all of that evidence, by a parabola.
+
+    reach: tolerances that a spread of it moves the channels; moved: mean square that those effects move them by.
+    """
+    usual = healthy.usual[k] ** 2 * (healthy.session_share + 1.0 / runs) + form_variance(healthy, reach, moved)
 
     def odds(scatter: float) -> float:
         narrow = scatter + sd**2
@@ -144,15 +158,18 @@ def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray,
     What healthy runs show of a label is no change: a hypothesis without it explains that much, too. Far from what is
     usual the likelihood is no parabola: of what a label really gains the same part is taken.
     """
-    gained = dict[frozenset[str], float]()
+    gained, moves = dict[frozenset[str], float](), dict[frozenset[str], float]()
     for one in sorted(every, key=lambda one: one.evidence):  # labels that were fitted twice: the better fit
         gained[frozenset(one.labels)] = one.evidence - log_prior(healthy, one.labels)
+        moves[frozenset(one.labels)] = float(((one.sizes * reach[healthy.at(one.labels)]) ** 2).sum())
     most = dict.fromkeys(gained, 0.0)
     for one in every:
         for label, k, size, sd in zip(one.labels, healthy.at(one.labels), one.sizes, one.sd, strict=True):
             without = frozenset(one.labels) - {label}
             if without in gained:
-                share, all_of_it = usual_share(healthy, k, float(reach[k]), float(size), float(sd), runs)
+                share, all_of_it = usual_share(
+                    healthy, k, float(reach[k]), float(size), float(sd), runs, moves[without]
+                )
                 gain = gained[frozenset(one.labels)] - gained[without]
                 part = float(np.clip(gain / all_of_it, 0.0, 1.0)) if all_of_it > 0.0 else 1.0
                 most[without] = max(most[without], part * share)
@@ -163,7 +180,7 @@ def log_prior(healthy: Healthy, labels: Sequence[str]) -> float:
     """Of a hypothesis: that something changed, which label, and that another stands beside it."""
     if not labels:
         return float(np.log1p(-HEALTHY.changed))
-    named = sum(one.family not in (PUSH, FORM) for one in healthy.effects)
+    named = sum(one.family not in (*UNEXPLAINED, FORM) for one in healthy.effects)
     each = [log_odds(healthy.effects[k]) - np.log(named) for k in healthy.at(labels)]
     return float(np.log(HEALTHY.changed) + sum(each) + (len(labels) - 1) * np.log(ANOTHER))
 
@@ -207,6 +224,22 @@ def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: i
         if moves.get(main, 0.0) < MATERIAL:
             name = NONE
         else:
-            name = UNKNOWN if known[main].family == PUSH else main
+            name = UNKNOWN if known[main].family in UNEXPLAINED else main
         chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
     return Posterior(every, weights, chances, reach, healthy)
+
+
+def group_of(chances: Mapping[str, float]) -> list[str]:
+    """The smallest set of labels that holds most of the probability of the causes, most probable first."""
+    known = sorted(((p, label) for label, p in chances.items() if label not in (NONE, UNKNOWN)), reverse=True)
+    total, group = sum(p for p, _ in known), list[str]()
+    for _, label in known:
+        if total <= 0.0 or sum(chances[one] for one in group) >= GROUP_MASS * total:
+            break
+        group.append(label)
+    return group
+
+
+def confounded(group: Sequence[str], what: str) -> list[str]:
+    """A caution, where more labels than are an answer explain what is named."""
+    return [f"{len(group)} labels explain {what} confounded: {', '.join(group)}"] if len(group) > MOST_GROUP else []

@@ -10,8 +10,8 @@ import numpy as np
 from glider.tools.data.files import write_files
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
-from glider.tools.own.decision import NONE, UNKNOWN, Healthy, Hypothesis, Posterior
-from glider.tools.own.effects import NOISE, PUSH, ModelPoint
+from glider.tools.own.decision import NONE, UNKNOWN, Healthy, Hypothesis, Posterior, confounded, group_of
+from glider.tools.own.effects import NOISE, UNEXPLAINED, ModelPoint
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
@@ -20,10 +20,6 @@ from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
 
 ANSWER, CORRECTED = "diagnosis.json", "corrected.toml"
-GROUP_MASS, MOST_GROUP = (
-    0.9,
-    3,
-)  # of the probability of causes that a group holds; labels in it that are still an answer
 SELECTED = 0.9  # probability that an effect of this label, or of its group, is there
 LEAST_PROBABILITY = 0.005
 KIND = "own"
@@ -39,17 +35,6 @@ def diagnose_own(
     return Engine(observer, healthy_of(observer), say).run(), observer
 
 
-def group_of(found: Posterior) -> list[str]:
-    """The smallest set of labels that holds most of the probability of the causes, most probable first."""
-    known = sorted(((p, label) for label, p in found.chances.items() if label not in (NONE, UNKNOWN)), reverse=True)
-    total, group = sum(p for p, _ in known), list[str]()
-    for _, label in known:
-        if total <= 0.0 or sum(found.chances[one] for one in group) >= GROUP_MASS * total:
-            break
-        group.append(label)
-    return group
-
-
 def verdict_of(chances: dict[str, float]) -> str:
     """none, unknown or cause, whichever is most probable."""
     cause = sum(p for label, p in chances.items() if label not in (NONE, UNKNOWN))
@@ -60,10 +45,13 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
     """diagnosis.json."""
     healthy, best = found.healthy, found.best
     effects = {one.label: one for one in healthy.effects}
-    verdict, group = verdict_of(found.chances), group_of(found)
+    verdict, group = verdict_of(found.chances), group_of(found.chances)
     chosen = _of_verdict(found, verdict)
     sizes = _sizes(found, effects)
-    selected = [label for label in chosen.labels if effects[label].family != PUSH and _selected(found, label, group)]
+    selected = [
+        label for label in chosen.labels
+        if effects[label].family not in UNEXPLAINED and _selected(found, label, group)
+    ]  # fmt: skip
     if verdict == NONE:
         selected = []
     causes = [
@@ -81,8 +69,8 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
         cautions.append(
             "the vehicle file is not identified: `glider identify` on healthy runs says what it leaves of them"
         )
-    if len(group) > MOST_GROUP and verdict == "cause":
-        cautions.append(f"{len(group)} labels explain these runs confounded: {', '.join(group)}")
+    if verdict == "cause":
+        cautions += confounded(group, "these runs")
     if vehicle.level and not vehicle.kernels.compiled:
         cautions.append(f"the model runs as plain Python, some hundred times slower: {vehicle.kernels.why}")
     return {

@@ -15,6 +15,8 @@ from glider.tools.own.runs import OwnRun
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 PUSH = "push"  # a constant beside a noise: what no label explains
+GROWTH = "growth"  # beside a noise, too: what grows from a run's first row on (a leak, a battery)
+UNEXPLAINED = frozenset({PUSH, GROWTH})
 NOISE = "noise"  # more of a noise than healthy runs have, or an oscillation: excess_noise.py
 # what the form of the model lacks, no label: a force at a noise that goes with an input, or with a run's mean inputs
 # (operating_points.py)
@@ -65,6 +67,7 @@ class ModelPoint:
     theta: np.ndarray
     reading: np.ndarray  # (5, outputs): gain, bias, drift, lag, delay
     push: np.ndarray  # (noises,)
+    growth: np.ndarray  # (noises,) a second, from the first row on
     form: np.ndarray  # (noises, inputs) a unit of the input, less its usual value
     operating: np.ndarray  # (noises, operating points) times `point_weights`
     density: np.ndarray  # (noises,)
@@ -75,7 +78,7 @@ class ModelPoint:
 
     def copy(self) -> "ModelPoint":
         return ModelPoint(
-            self.theta.copy(), self.reading.copy(), self.push.copy(), self.form.copy(),
+            self.theta.copy(), self.reading.copy(), self.push.copy(), self.growth.copy(), self.form.copy(),
             self.operating.copy(), self.density.copy(), self.variance.copy(), self.ports.copy(), self.own.copy(),
             {key: dict(value) for key, value in self.driven.items()},
         )  # fmt: skip
@@ -95,6 +98,7 @@ def nominal_point(declared: Declaration) -> ModelPoint:
     return ModelPoint(
         np.array([one.value for one in declared.parameters]),
         reading,
+        np.zeros(len(declared.noises)),
         np.zeros(len(declared.noises)),
         form,
         operating,
@@ -126,6 +130,8 @@ def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], v
             own[effect.kind] = own.get(effect.kind, 0.0) + size
         elif effect.family == PUSH:
             found.push[declared.index("noises", effect.name)] += size
+        elif effect.family == GROWTH:
+            found.growth[declared.index("noises", effect.name)] += size
         elif effect.at_point is not None:
             found.operating[declared.index("noises", effect.name), effect.at_point] += size
         elif effect.family == FORM:
@@ -164,6 +170,15 @@ def pushes(declared: Declaration) -> list[Effect]:
     """A constant beside every noise: an effect that no label has."""
     return [
         Effect(f"{one.name}_push", PUSH, one.name, "push", one.unit, max(one.density, 1e-6)) for one in declared.noises
+    ]
+
+
+def unexplained(declared: Declaration, runs: Sequence[OwnRun]) -> list[Effect]:
+    """Forces beside every noise that no label has: a constant one, and one that grows in a run."""
+    duration = max(float(run.t[-1] - run.t[0]) for run in runs)
+    return pushes(declared) + [
+        Effect(f"{one.name}_growth", GROWTH, one.name, "growth", f"{one.unit}/s", max(one.density, 1e-6) / duration)
+        for one in declared.noises
     ]
 
 
@@ -216,9 +231,10 @@ def held_inputs(declared: Declaration, driven: np.ndarray) -> np.ndarray:
     return found
 
 
-def forces(declared: Declaration, point: ModelPoint, driven: np.ndarray) -> np.ndarray:
-    """What stands beside the noises along a run, (rows, noises), by the inputs that drive it (rows, inputs)."""
-    found = np.tile(point.push, (len(driven), 1))
+def forces(declared: Declaration, point: ModelPoint, t: np.ndarray, driven: np.ndarray) -> np.ndarray:
+    """What stands beside the noises along a run, (rows, noises), by time (rows,) and the inputs that drive it (rows,
+    inputs)."""
+    found = point.push + (t - t[0])[:, None] * point.growth
     if point.form.any():
         usual = np.array([declared.usual_inputs.get(one.name, (0.0, 0.0))[0] for one in declared.inputs])
         found += (driven - usual) @ point.form.T

@@ -7,7 +7,7 @@ import numpy as np
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.own.decision import Healthy
 from glider.tools.own.declare import RUN
-from glider.tools.own.effects import NOISE, ModelPoint, form_errors, moved, noise_effects, pushes, standard_effects
+from glider.tools.own.effects import NOISE, ModelPoint, form_errors, moved, noise_effects, standard_effects, unexplained
 from glider.tools.own.error_components import Components, Whitening, patterns
 from glider.tools.own.files import IdentifiedTable
 from glider.tools.own.hierarchy import ChannelErrors
@@ -22,7 +22,7 @@ def healthy_of(observer: Observer) -> Healthy:
     """What an identified vehicle file says of itself; one that is not identified, what it allows for."""
     declared, table = observer.declared, observer.vehicle.file.identified
     labels = standard_effects(declared, observer.runs, observer.tolerances)
-    effects = [*labels, *noise_effects(declared), *pushes(declared), *form_errors(declared)]
+    effects = [*labels, *noise_effects(declared), *unexplained(declared, observer.runs), *form_errors(declared)]
     names = [one.label for one in effects]
     k = len(effects)
     # noise of healthy runs is taken from the evidence of more by itself (`noise_gain`)

@@ -24,6 +24,7 @@ from glider.tools.own.effects import (
     noise_effects,
     pushes,
     standard_effects,
+    unexplained,
     usual_inputs,
 )
 from glider.tools.own.error_components import Components, Whitening, independence, learn_components, patterns
@@ -235,7 +236,8 @@ def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tup
     make it. 1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`
     for what it does in tolerances, so that labels that act alike differ alike, in whatever unit.
     """
-    labels = [*standard_effects(observer.declared, observer.runs, observer.tolerances), *pushes(observer.declared)]
+    labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
+    labels += unexplained(observer.declared, observer.runs)
     every = [*labels, *form_errors(observer.declared)]
     into = placed(nuisance, every)
     about = []

@@ -25,7 +25,7 @@ TIME_CONSTANTS = 3.0  # in a window
 WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
 NOTHING = np.zeros(0)
 NO_POINT = ModelPoint(
-    NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
+    NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
@@ -222,8 +222,8 @@ class Observer:
             driven = driven_inputs(run, declared, point)
             value, squares, samples = kernels.filter_run(
                 run.t, held_inputs(declared, driven), run.outputs, x, P, point.theta, point.own, point.reading,
-                forces(declared, point, driven), point.density, point.variance, point.ports, self.kinds, self.scales,
-                self.angles, self.parts, keep,
+                forces(declared, point, run.t, driven), point.density, point.variance, point.ports, self.kinds,
+                self.scales, self.angles, self.parts, keep,
             )  # fmt: skip
         except np.linalg.LinAlgError:
             value, squares, samples = np.inf, np.inf, 1
@@ -238,7 +238,7 @@ class Observer:
         states, first = np.full(by.states.shape, np.nan), slice(rows)
         x, _ = self.start(n, point)
         driven = driven_inputs(run, self.declared, point)
-        beside, driven = forces(self.declared, point, driven)[first], driven[first]
+        beside, driven = forces(self.declared, point, run.t, driven)[first], driven[first]
         with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
             kernels.follow_run(
                 run.t[first], held_inputs(self.declared, driven), run.outputs[first], x, point.theta, point.own,
@@ -282,7 +282,7 @@ class Observer:
             with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
                 kernels.fly_run(
                     run.t, held_inputs(self.declared, driven), starts, ends, states[starts], point.theta, point.own,
-                    point.reading, forces(self.declared, point, driven) + beside, self.kinds, self.angles,
+                    point.reading, forces(self.declared, point, run.t, driven) + beside, self.kinds, self.angles,
                     self.parts, out,
                 )  # fmt: skip
         return out

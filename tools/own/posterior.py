@@ -27,7 +27,7 @@ from glider.tools.own.decision import (
     log_prior,
     strangeness,
 )
-from glider.tools.own.effects import FORM, NOISE, PUSH, moved
+from glider.tools.own.effects import FORM, NOISE, PUSH, UNEXPLAINED, moved
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room
 from glider.tools.own.observer import Observer
@@ -185,7 +185,7 @@ class Engine:
         found, reach, forces = V.copy(), np.maximum(self.reach, LEAST_REACH), self.forces
         for k, size in zip(places, sizes, strict=True):
             found[k, k] += (size / reach[k]) ** 2
-            if self.healthy.effects[k].family != PUSH and len(forces):
+            if self.healthy.effects[k].family not in UNEXPLAINED and len(forces):
                 found[forces, forces] += (form * shared[k] * reach[k] / reach[forces]) ** 2 / len(forces)
         return found
 

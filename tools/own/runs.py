@@ -17,6 +17,7 @@ from glider.tools.data.sources import read_text
 from glider.tools.own.declare import Declaration
 
 MIN_ROWS = 5
+UNNAMED = "-"  # vehicle of a case without case.toml
 
 
 class OwnCaseTable(Table):
@@ -43,12 +44,17 @@ class OwnRun:
 
 
 def case_table(folder: Path) -> OwnCaseTable:
-    """case.toml; InputError or ConfigError where there is none or it cannot be read."""
+    """case.toml, or what it is taken for where runs lie without one: --vehicle names their vehicle then.
+
+    InputError or ConfigError where there is nothing of a case or it cannot be read.
+    """
     path = folder / CASE_FILE
     if not folder.is_dir():
         raise InputError("not a folder" if folder.exists() else "no such folder", source=folder)
     if not path.is_file():
-        raise InputError(f"no {CASE_FILE} in this folder", source=folder)
+        if run_files(folder):
+            return OwnCaseTable(format=1, vehicle=UNNAMED)
+        raise InputError(f"neither {CASE_FILE} nor run*.csv in this folder", source=folder)
     return decode(read_text(path), OwnCaseTable, str(path))
 
 

@@ -24,7 +24,7 @@ from glider.tools.own.decision import (
     strangeness,
     usual_share,
 )
-from glider.tools.own.effects import FORM, PUSH
+from glider.tools.own.effects import FORM, UNEXPLAINED
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import observer_of
@@ -41,9 +41,18 @@ NEW_SESSION = 0.5  # prior probability that they are not all of one session
 TO_THE_END = 0.5  # of spans: that a change is still there in the last run
 WITH_SESSION = 0.5  # of changes: that they begin with a session, where one begins
 MOST_EVENTS = 4
-REFITTED, SPANS = 5, 4  # labels, of the best spans, whose parabolas are taken where they lead to
-UNLIKELY = 7.0  # nat behind the best by the parabola there: not taken
+REFITTED, SPANS = 5, 4  # labels by the parabola about no label, over the best spans
+UNLIKELY = 7.0  # nat behind the best by the parabola there: not refitted
 SHOWN = 3  # numbers that a session differs by
+
+
+@dataclass(frozen=True)
+class Place:
+    """A span of runs, sessions with it, and log odds (k,) of each label there by a parabola."""
+
+    span: tuple[int, int]
+    sessions: Sequence[Session]
+    scores: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,7 @@ class Watch(WatchedRuns):
     @property
     def named(self) -> int:
         """How many labels there are."""
-        return sum(one.family not in (PUSH, FORM) for one in self.healthy.effects)
+        return sum(one.family not in (*UNEXPLAINED, FORM) for one in self.healthy.effects)
 
     def scored(self, spans: Sequence[tuple[int, int]], sessions: Sequence[Session]) -> np.ndarray:
         """Log evidence (spans, labels) of every label over every span; -inf where nothing moves."""
@@ -125,10 +134,10 @@ class Watch(WatchedRuns):
                 tables.append((further, own, self.scored(own, further) + prior(own, further) + gain))
             ranked = sorted(((float(scores[row].max()), t, row) for t, (_, own, scores) in enumerate(tables)
                              for row in range(len(own))), reverse=True)  # fmt: skip
-            found, any_change = list[Refit](), logsumexp(np.concatenate([scores.ravel() for *_, scores in tables]))
-            for _, t, row in ranked[:SPANS] if any_change + CHANGE_ODDS > 0.0 else ():
-                theirs, own, scores = tables[t]
-                found += self.compared(own[row], self.expanded(theirs), scores[row])
+            any_change = logsumexp(np.concatenate([scores.ravel() for *_, scores in tables])) + CHANGE_ODDS > 0.0
+            places = [Place(tables[t][1][row], self.expanded(tables[t][0]), tables[t][2][row])
+                      for _, t, row in (ranked[:SPANS] if any_change else ())]  # fmt: skip
+            found = self.compared(places)
             total = float(logsumexp([one.score for one in found])) + CHANGE_ODDS if found else -np.inf
             if total > other:
                 taken, chances = self.decided(found)
@@ -148,16 +157,41 @@ class Watch(WatchedRuns):
     def name(self, n: int) -> str:
         return self.observer.runs[n].name
 
-    def compared(self, span: tuple[int, int], sessions: Sequence[Session], scores: np.ndarray) -> list[Refit]:
-        """Labels over a span, refitted where each leads; others in the place of the best until it stays the best."""
-        starts, runs = {int(k): 0.0 for k in np.argsort(scores)[::-1][:REFITTED]}, range(*span)
-        if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
-            starts |= dict(self.strong_sizes(runs)[:REFITTED])
-        found, best = [self.refit(span, k, start, sessions) for k, start in starts.items()], None
-        while (leading := max(found, key=lambda one: one.score)) is not best:
-            best = leading
-            found += self.swapped(best, found)
-        return found
+    def compared(self, places: Sequence[Place]) -> list[Refit]:
+        """Labels over spans, refitted where each leads.
+
+        First those that are best by the parabola about no label. Then, where an event can be probable, every label that
+        is likely in the best one's place, over each of the spans, until the best one stays.
+        """
+        found, best = dict[tuple[str, int, int], Refit](), None
+
+        def refit(one: Place, starts: dict[int, float]) -> None:
+            for k, start in starts.items():
+                new = self.refit(one.span, k, start, one.sessions)
+                key = (new.event.label, *one.span)
+                if key not in found or found[key].score < new.score:
+                    found[key] = new
+
+        for one in places:
+            starts, runs = {int(k): 0.0 for k in np.argsort(one.scores)[::-1][:REFITTED]}, range(*one.span)
+            if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
+                starts |= dict(self.strong_sizes(runs)[:REFITTED])
+            refit(one, starts)
+        while found and (leading := max(found.values(), key=lambda one: one.score)) is not best:
+            if leading.score + np.log(self.named) + CHANGE_ODDS < 0.0:
+                break
+            best, span = leading, (leading.event.first, leading.event.end)
+            predicted, size = self.swapped(best)
+            known = np.array([found[key].score if (key := (one.label, *span)) in found else -np.inf
+                              for one in self.healthy.effects])  # fmt: skip
+            likely = predicted > np.maximum(known, best.score - UNLIKELY)
+            refit(Place(span, best.sessions, predicted), {int(k): float(size[k]) for k in np.flatnonzero(likely)})
+            most = max(one.score for one in found.values())
+            of_span = [one for (_, *at), one in found.items() if tuple(at) == span and one.score > most - UNLIKELY]
+            for one in places:
+                refit(one, {int(self.healthy.at([other.event.label])[0]): other.event.size for other in of_span
+                            if (other.event.label, *one.span) not in found})  # fmt: skip
+        return list(found.values())
 
     def decided(self, found: Sequence[Refit]) -> tuple[Refit, dict[str, float]]:
         """The event that is most probable of labels over spans, one of which it is, and the chance of each label: a
@@ -166,23 +200,22 @@ class Watch(WatchedRuns):
         chances: dict[str, float] = {}
         for one in found:
             chances[one.event.label] = chances.get(one.event.label, 0.0) + float(np.exp(one.score - total))
-        forces = {label for label in chances if effects[label].family == PUSH}
+        forces = {label for label in chances if effects[label].family in UNEXPLAINED}
         named = sum(chance for label, chance in chances.items() if label not in forces)
         among = [label for label in chances if (label in forces) == (named < 0.5)]
         label = max(among, key=lambda label: chances[label])
         return max((one for one in found if one.event.label == label), key=lambda one: one.score), chances
 
-    def swapped(self, best: Refit, refitted: Sequence[Refit]) -> list[Refit]:
-        """Labels in an event's place that come nearest to it where it leads, refitted."""
+    def swapped(self, best: Refit) -> tuple[np.ndarray, np.ndarray]:
+        """Scores (k,) of labels in an event's place by the parabola where it leads, and their sizes."""
         span, every, warm = (best.event.first, best.event.end), np.arange(self.k), Warm()
         (place,) = self.healthy.at([best.event.label])
         runs = [self.again(n, best.sessions, every, place, best.event.size, warm) for n in range(*span)]
         there = dict(zip(range(*span), self.together.marginal(runs), strict=True))
         gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(best.sessions, there)))
-        likely = gain > gain[place] - UNLIKELY
-        likely[self.healthy.at([one.event.label for one in refitted])] = False
-        return [self.refit(span, int(k), float(size[k]), best.sessions)
-                for k in np.argsort(-np.where(likely, gain, -np.inf))[:REFITTED] if likely[k]]  # fmt: skip
+        predicted = best.score + gain - gain[place]
+        predicted[place] = -np.inf
+        return predicted, size
 
     def refit(self, span: tuple[int, int], k: int, start: float, sessions: Sequence[Session]) -> Refit:
         """A label over a span where it is most probable: log odds against what is known, and the event."""
@@ -206,11 +239,21 @@ class Watch(WatchedRuns):
             evidence += float((slope[0] - precision[0, 0] * at.size) * at.size)
             nat, mean, sd = size_posterior(precision[0, :1] * at.size, precision[:1, :1], d[:, :1], effect.one_sided)
         mean = float(np.clip(mean, self.low[k], self.high[k]))
-        usual, _ = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0])
+        usual, _ = usual_share(
+            healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0], self.moved_by_events(span)
+        )
         prior = self.span_prior(*span, at.sessions) - np.log(self.named) + log_odds(effect)
         score = evidence + nat - log_evidence(self.pooled(self.sessions)) - usual + prior
         event = Event({}, *span, effect.label, mean, sd, 0.0)
         return Refit(score + self.session_prior(at.sessions), event, at.sessions)
+
+    def moved_by_events(self, span: tuple[int, int]) -> float:
+        """Mean square (tolerances squared) that events move the channels by over a span."""
+        found = 0.0
+        for one in self.events:
+            share = max(0, min(one.end, span[1]) - max(one.first, span[0])) / (span[1] - span[0])
+            found += (share * one.size * self.reach[self.healthy.at([one.label])[0]]) ** 2
+        return float(found)
 
     def judge(self) -> np.ndarray:
         """Probability of each run to have more left than healthy ones and its events say."""

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 
 from glider.tools.data.intervals import NINETY
-from glider.tools.own.decision import UNKNOWN, Healthy
-from glider.tools.own.effects import PUSH
+from glider.tools.own.decision import UNKNOWN, Healthy, confounded, group_of
+from glider.tools.own.effects import UNEXPLAINED
 
 CERTAIN = 0.5  # probability from which an event is one
-GROUP = 0.1  # of a label's probability: others of at least so much share its group
 
 
 @dataclass
@@ -61,17 +60,18 @@ class Watched:
             )
         return {
             "format": 1, "runs": runs, "events": events, "sessions": self.sessions, "reference": self.reference,
-            "cautions": self.cautions,
+            "cautions": [
+                *self.cautions,
+                *(text for one in events for text in confounded(one["group"], f"the change from {one['from_run']} on")),
+            ],
         }  # fmt: skip
 
     def _event(self, one: Event, effects) -> dict[str, Any]:
         effect = effects[one.label]
-        known = effect.family != PUSH
+        known = effect.family not in UNEXPLAINED
         low, high = ((one.size + side * NINETY * one.sd) * effect.spread for side in (-1.0, 1.0))
         # of an unknown change the labels that come nearest
-        top = max((p for label, p in one.chances.items() if known or effects[label].family != PUSH), default=0.0)
-        group = [label for label, p in sorted(one.chances.items(), key=lambda item: -item[1])
-                 if p > GROUP * top and effects[label].family != PUSH]  # fmt: skip
+        group = group_of({label: p for label, p in one.chances.items() if effects[label].family not in UNEXPLAINED})
         places: dict[tuple[str, str], float] = {}
         for label, p in one.chances.items():
             where = effects[label].where

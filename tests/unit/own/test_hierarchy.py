@@ -134,6 +134,13 @@ def test_what_healthy_runs_show_of_a_label_is_no_evidence_of_a_change(usual, lea
     assert least <= usual_share(asked.healthy, 0, float(asked.reach[0]), 0.5, 0.08, 4)[0] <= most
 
 
+@pytest.mark.parametrize(("moved", "least", "most"), [(0.0, 0.0, 0.0), (0.25, 1.0, 12.0), (100.0, 15.0, 1e3)])
+def test_what_the_form_of_an_effect_lacks_is_no_evidence_of_another_beside_it(moved, least, most):
+    """A label of 0.5 tolerances beside effects of mean square `moved`, whose form is 0.2 of them off."""
+    asked = engine(4)
+    assert least <= usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, moved)[0] <= most
+
+
 def test_of_a_label_a_force_may_be_that_its_equations_do_not_have():
     asked = engine(4)
     V = asked.variance(np.zeros((3, 3)), [0], [2.0], np.array([5.0, 0.0, 0.0]), 0.2)
