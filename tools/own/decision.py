@@ -153,27 +153,34 @@ def usual_share(
 
 
 def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: int) -> np.ndarray:
-    """Log evidence of hypotheses (hypotheses,), each with what a usual deviation of one label more brings it.
+    """Log evidence of hypotheses (hypotheses,), each with what a usual deviation of one label more brings it, and
+    without what the form of some of its effects would bring that another has.
 
     What healthy runs show of a label is no change: a hypothesis without it explains that much, too. Far from what is
     usual the likelihood is no parabola: of what a label really gains the same part is taken.
     """
-    gained, moves = dict[frozenset[str], float](), dict[frozenset[str], float]()
+    gained = dict[frozenset[str], float]()
     for one in sorted(every, key=lambda one: one.evidence):  # labels that were fitted twice: the better fit
         gained[frozenset(one.labels)] = one.evidence - log_prior(healthy, one.labels)
-        moves[frozenset(one.labels)] = float(((one.sizes * reach[healthy.at(one.labels)]) ** 2).sum())
-    most = dict.fromkeys(gained, 0.0)
+    most, by_form = dict.fromkeys(gained, 0.0), dict.fromkeys(gained, 0.0)
     for one in every:
-        for label, k, size, sd in zip(one.labels, healthy.at(one.labels), one.sizes, one.sd, strict=True):
-            without = frozenset(one.labels) - {label}
-            if without in gained:
-                share, all_of_it = usual_share(
-                    healthy, k, float(reach[k]), float(size), float(sd), runs, moves[without]
+        own = frozenset(one.labels)
+        moves = (one.sizes * reach[healthy.at(one.labels)]) ** 2
+        for n, (label, k) in enumerate(zip(one.labels, healthy.at(one.labels), strict=True)):
+            if own - {label} not in gained:
+                continue
+            gain = gained[own] - gained[own - {label}]
+
+            def share(moved: float, n: int = n, k: int = k, gain: float = gain, one: Hypothesis = one) -> float:
+                nat, all_of_it = usual_share(
+                    healthy, k, float(reach[k]), float(one.sizes[n]), float(one.sd[n]), runs, moved
                 )
-                gain = gained[frozenset(one.labels)] - gained[without]
-                part = float(np.clip(gain / all_of_it, 0.0, 1.0)) if all_of_it > 0.0 else 1.0
-                most[without] = max(most[without], part * share)
-    return np.array([one.evidence + most[frozenset(one.labels)] for one in every])
+                return nat * (float(np.clip(gain / all_of_it, 0.0, 1.0)) if all_of_it > 0.0 else 1.0)
+
+            usual = share(0.0)
+            most[own - {label}] = max(most[own - {label}], usual)
+            by_form[own] = max(by_form[own], share(float(moves.sum() - moves[n])) - usual)
+    return np.array([one.evidence + most[frozenset(one.labels)] - by_form[frozenset(one.labels)] for one in every])
 
 
 def log_prior(healthy: Healthy, labels: Sequence[str]) -> float:

@@ -16,6 +16,7 @@ from scipy.stats import norm
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.own.decision import (
+    ANOTHER,
     FORM_SHARES,
     MATERIAL,
     SIZES,
@@ -71,6 +72,11 @@ class Watch(WatchedRuns):
     def named(self) -> int:
         """How many labels there are."""
         return sum(one.family not in (*UNEXPLAINED, FORM) for one in self.healthy.effects)
+
+    @property
+    def change_odds(self) -> float:
+        """Log prior odds that something changed, or something else beside the events that are known."""
+        return float(np.log(ANOTHER)) if self.events else CHANGE_ODDS
 
     def scored(self, spans: Sequence[tuple[int, int]], sessions: Sequence[Session]) -> np.ndarray:
         """Log evidence (spans, labels) of every label over every span; -inf where nothing moves."""
@@ -134,11 +140,11 @@ class Watch(WatchedRuns):
                 tables.append((further, own, self.scored(own, further) + prior(own, further) + gain))
             ranked = sorted(((float(scores[row].max()), t, row) for t, (_, own, scores) in enumerate(tables)
                              for row in range(len(own))), reverse=True)  # fmt: skip
-            any_change = logsumexp(np.concatenate([scores.ravel() for *_, scores in tables])) + CHANGE_ODDS > 0.0
+            any_change = logsumexp(np.concatenate([scores.ravel() for *_, scores in tables])) + self.change_odds > 0.0
             places = [Place(tables[t][1][row], self.expanded(tables[t][0]), tables[t][2][row])
                       for _, t, row in (ranked[:SPANS] if any_change else ())]  # fmt: skip
             found = self.compared(places)
-            total = float(logsumexp([one.score for one in found])) + CHANGE_ODDS if found else -np.inf
+            total = float(logsumexp([one.score for one in found])) + self.change_odds if found else -np.inf
             if total > other:
                 taken, chances = self.decided(found)
                 best = taken.event
@@ -178,7 +184,7 @@ class Watch(WatchedRuns):
                 starts |= dict(self.strong_sizes(runs)[:REFITTED])
             refit(one, starts)
         while found and (leading := max(found.values(), key=lambda one: one.score)) is not best:
-            if leading.score + np.log(self.named) + CHANGE_ODDS < 0.0:
+            if leading.score + np.log(self.named) + self.change_odds < 0.0:
                 break
             best, span = leading, (leading.event.first, leading.event.end)
             predicted, size = self.swapped(best)
