@@ -236,3 +236,20 @@ def test_a_label_far_from_what_is_usual_is_not_lost_to_another(gain, size, first
     every.append(fitted(("gain", "mass"), gain - 4.0, [size, 0.0]))
     found = decide(every, one, np.full(3, 1.0 / size), 4)
     assert max(found.chances, key=lambda label: found.chances[label]) == first
+
+
+@pytest.mark.parametrize(("size", "beside"), [(0.3, False), (6.0, True)], ids=["within its form", "beyond"])
+def test_an_effect_stands_beside_another_only_beyond_what_its_form_may_lack(size, beside):
+    """Of 5 tolerances, its form 20 % off; another gains 12.5 nat beside it, as 5 sigma do; the odds of one stay."""
+    one = healthy()
+
+    def fitted(labels: tuple[str, ...], nat: float, sizes: list[float]) -> Hypothesis:
+        known = np.array(sizes)
+        return Hypothesis(labels, nat + log_prior(one, labels), known, known / 5.0, np.zeros(3),
+                          np.zeros((4, 3)), np.ones(4))  # fmt: skip
+
+    alone = [fitted((), 0.0, []), fitted(("gain",), 2.0, [5.0])]
+    both = decide([*alone, fitted(("gain", "mass"), 14.5, [5.0, size])], one, np.ones(3), 4)
+    assert (both.weights[2] > 0.5) == beside
+    ratio = both.weights[1] / both.weights[0]
+    assert ratio == pytest.approx(np.divide(*decide(alone, one, np.ones(3), 4).weights[::-1]))
