@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from glider.tools.own.neighbours import import_file, module_names, neighbours
+
 KERNELS = Path(__file__).with_name("kernels.py")
 NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run")
 PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile
@@ -96,50 +98,52 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
 
     from glider.firmware.core import jit  # sets Numba's cache folder
 
-    user = path.read_bytes()
     source, motion = KERNELS.read_text(encoding="utf-8"), "step" if hasattr(model, "step") else "derivative"
     # the model may call the tree's own kernels
     versions = (numba.__version__ + jit.kernels_digest()).encode()
-    key = hashlib.sha256(user + source.encode() + versions).hexdigest()[:20]
+    texts = {one.relative_to(path.parent): one.read_bytes() for one in (path, *neighbours(path))}
+    key = hashlib.sha256(b"".join(texts.values()) + source.encode() + versions).hexdigest()[:20]
     folder = jit.cache_root() / "own" / key
-    folder.mkdir(parents=True, exist_ok=True)
     kept, kernels = folder / path.name, folder / "observer_kernels.py"
-    for file, text in ((kept, user), (kernels, source.encode())):
+    for file, text in (*((folder / name, text) for name, text in texts.items()), (kernels, source.encode())):
         if not file.is_file() or file.read_bytes() != text:
             from glider.tools.data.files import write_bytes
 
+            file.parent.mkdir(parents=True, exist_ok=True)
             write_bytes(file, text)
     options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-    theirs = _user_module(kept, key, path.parent)
-    for name, value in list(vars(theirs).items()):
-        if isinstance(value, types.FunctionType) and value.__module__ == theirs.__name__:
-            vars(theirs)[name] = numba.njit(**options)(value)
+    theirs, beside = _user_module(kept, key, path.parent)
+    own, compiled = {one.__name__ for one in (theirs, *beside.values())}, dict[types.FunctionType, Any]()
+    for module in (theirs, *beside.values()):
+        for name, value in list(vars(module).items()):
+            if isinstance(value, types.FunctionType) and value.__module__ in own:
+                vars(module)[name] = compiled.setdefault(value, numba.njit(**options)(value))
     owner = getattr(theirs, attribute) if attribute else theirs
     given: dict[str, Any] = {}
     for name in (motion, "measure"):
         function = getattr(owner, name)
         given[name] = function if hasattr(function, "py_func") else numba.njit(**options)(function)
     name = f"glider_own_{key}"
-    module = _module(name, kernels, given)
+    observer = _module(name, kernels, given)
     for one in (*NAMES, "advance"):
-        vars(module)[one] = numba.njit(**options)(vars(module)[one])
+        vars(observer)[one] = numba.njit(**options)(vars(observer)[one])
     x, u, w, theta = tried
-    module.advance(x, u, w, theta, 0.01, 1)
+    observer.advance(x, u, w, theta, 0.01, 1)
     given["measure"](x, u, theta)
-    return Kernels(module.filter_run, module.follow_run, module.fly_run, module.advance, given["measure"], True, "")
+    return Kernels(observer.filter_run, observer.follow_run, observer.fly_run, observer.advance, given["measure"],
+                   True, "")  # fmt: skip
 
 
-def _user_module(kept: Path, key: str, beside: Path) -> types.ModuleType:
-    """A copy of the user's module, whose functions may be replaced by compiled ones; its neighbours can be imported."""
-    name = f"glider_own_model_{key}"
-    spec = importlib.util.spec_from_file_location(name, kept)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    sys.path.insert(0, str(beside))
+def _user_module(kept: Path, key: str, beside: Path) -> tuple[types.ModuleType, dict[str, types.ModuleType]]:
+    """A copy of the user's module, whose functions may be replaced by compiled ones, and copies of its neighbours.
+
+    beside: the folder that they are from, in which other files lie that they may read.
+    """
+    names = module_names(kept)
+    loaded = {one: sys.modules[one] for one in names if one in sys.modules}
     try:
-        spec.loader.exec_module(module)
+        return import_file(f"glider_own_model_{key}", kept, kept.parent, beside)
     finally:
-        sys.path.remove(str(beside))
-    return module
+        for one in names:
+            sys.modules.pop(one, None)
+        sys.modules.update(loaded)

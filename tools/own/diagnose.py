@@ -15,6 +15,7 @@ from glider.tools.own.effects import NOISE, UNEXPLAINED, ModelPoint
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.model_files import moved_to
 from glider.tools.own.observer import Observer, observer_of
 from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
@@ -184,14 +185,13 @@ def write(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
         given.setdefault("parameters", {}).setdefault(name, {})["value"] = value
     wrong = {"sensors": answer["corrected"]["sensors"], "inputs": answer["corrected"]["inputs"]}
     given["corrections"] = {kind: one for kind, one in wrong.items() if one}
-    files = {out / ANSWER: (json.dumps(as_plain(answer), indent=1) + "\n").encode("utf-8")}
-    source = vehicle.source
-    if source is not None and (out / source.name).resolve() != source.resolve():
-        files[out / source.name] = source.read_bytes()
+    files, given = moved_to(out, vehicle, given)
+    files[out / ANSWER] = (json.dumps(as_plain(answer), indent=1) + "\n").encode("utf-8")
     if not given["corrections"]:
         del given["corrections"]
     files[out / CORRECTED] = toml_text(given).encode("utf-8")
-    out.mkdir(parents=True, exist_ok=True)
+    for one in files:
+        one.parent.mkdir(parents=True, exist_ok=True)
     write_files(files)
     return answer
 

@@ -101,6 +101,7 @@ class OwnVehicle(Table):
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     model: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+    model_folder: str = ""  # where that is looked for, from this file's folder
     name: str = ""
     parameters: dict[str, ParameterTable] = msgspec.field(default_factory=dict)
     sensors: dict[str, SensorTable] = msgspec.field(default_factory=dict)

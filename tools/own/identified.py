@@ -13,6 +13,7 @@ from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
 from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.identify import Identified
+from glider.tools.own.model_files import moved_to
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
 
@@ -172,13 +173,12 @@ def groups(found: Identified, correlation: float = 0.98) -> list[list[str]]:
 
 
 def write(found: Identified, out: Path) -> None:
-    """identified.toml and identified.json into a folder; the model's own file beside them."""
-    out.mkdir(parents=True, exist_ok=True)
-    files = {
-        out / VEHICLE: toml_text(tables(found)).encode("utf-8"),
+    """identified.toml and identified.json into a folder; the model's own files beside them."""
+    files, vehicle = moved_to(out, found.vehicle, tables(found))
+    files |= {
+        out / VEHICLE: toml_text(vehicle).encode("utf-8"),
         out / ANSWER: (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode("utf-8"),
     }
-    source = found.vehicle.source
-    if source is not None and source.parent == found.vehicle.path.resolve().parent and source.parent != out.resolve():
-        files[out / source.name] = source.read_bytes()
+    for one in files:
+        one.parent.mkdir(parents=True, exist_ok=True)
     write_files(files)

@@ -4,8 +4,6 @@ Errors of the user's file name that file and its line.
 """
 
 import importlib
-import importlib.util
-import sys
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,8 +19,10 @@ from glider.tools.data.sources import read_text
 from glider.tools.own.compiled import Kernels, kernels_of
 from glider.tools.own.declare import QUATERNION, Declaration, DeclarationError, declaration
 from glider.tools.own.files import OwnVehicle, declared_with, decode_own
+from glider.tools.own.neighbours import import_file, neighbours
 
 ENTRY_POINTS = "glider.vehicles"
+PROGRAM = "exec:"
 
 
 @dataclass
@@ -43,6 +43,11 @@ class LoadedVehicle:
     @property
     def name(self) -> str:
         return self.file.name or self.path.stem
+
+    @property
+    def folder(self) -> Path:
+        """Where its model is looked for."""
+        return self.path.parent / self.file.model_folder
 
     def zeros(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """x, u, w, theta of a vehicle at rest."""
@@ -72,7 +77,7 @@ def read_own(path: Path) -> LoadedVehicle:
     def wrong(message: str) -> ConfigError:
         return ConfigError(str(path), message, key="model", line=locate(text, ["model"]))
 
-    model, source, attribute = _import(given.model, path, wrong)
+    model, source, attribute = _import(given.model, path.parent / given.model_folder, wrong)
     try:
         declared = declaration(model)
     except DeclarationError as error:
@@ -88,20 +93,20 @@ def read_own(path: Path) -> LoadedVehicle:
     return LoadedVehicle(path, text, given, model, source, attribute, declared, 1 if steps else 0)
 
 
-def _import(wanted: str, path: Path, wrong: Callable[[str], ConfigError]) -> tuple[Any, Path | None, str]:
+def _import(wanted: str, folder: Path, wrong: Callable[[str], ConfigError]) -> tuple[Any, Path | None, str]:
     """The model object, its file, and its name in it."""
     if wanted.endswith(".fmu"):
         from glider.tools.own.fmu import FmuModel
 
-        file = (path.parent / wanted).resolve()
+        file = (folder / wanted).resolve()
         if not file.is_file():
             raise wrong(f"no file {wanted} beside it")
         return FmuModel(file), file, ""
-    if wanted.startswith("exec:"):
+    if wanted.startswith(PROGRAM):
         from glider.tools.own.process import ProcessModel
 
-        return ProcessModel(wanted.removeprefix("exec:").strip(), path.parent), None, ""
-    if ":" not in wanted and not (path.parent / f"{wanted}.py").is_file():
+        return ProcessModel(wanted.removeprefix(PROGRAM).strip(), folder), None, ""
+    if ":" not in wanted and not (folder / f"{wanted}.py").is_file():
         found = [one for one in metadata.entry_points(group=ENTRY_POINTS) if one.name == wanted]
         if not found:
             raise wrong(
@@ -109,20 +114,11 @@ def _import(wanted: str, path: Path, wrong: Callable[[str], ConfigError]) -> tup
             )
         wanted = found[0].value
     module_name, _, attribute = wanted.partition(":")
-    file = (path.parent / f"{module_name}.py").resolve()
+    file = (folder / f"{module_name}.py").resolve()
     try:
         if file.is_file():
             name = f"glider_own_given_{abs(hash(str(file)))}"
-            spec = importlib.util.spec_from_file_location(name, file)
-            assert spec is not None
-            assert spec.loader is not None
-            module = importlib.util.module_from_spec(spec)
-            sys.modules[name] = module
-            sys.path.insert(0, str(path.parent))
-            try:
-                spec.loader.exec_module(module)
-            finally:
-                sys.path.remove(str(path.parent))
+            module, _ = import_file(name, file, folder)
         else:
             module = importlib.import_module(module_name)
             file = Path(module.__file__) if module.__file__ else file
@@ -156,13 +152,15 @@ def _static(owner: type) -> bool:
 
 
 def user_error(error: BaseException, source: Path | None, where: str) -> InputError:
-    """An exception of the user's code as one line: file, line, function and what it said."""
+    """An exception of the user's code as one line: file (the model's or one beside it), line, where, what it said."""
     if isinstance(error, SyntaxError):
         return InputError(f"{where}: {error.msg}", source=error.filename, line=error.lineno)
     frames = traceback.extract_tb(error.__traceback__)
-    own = [one for one in frames if source is not None and Path(one.filename).name == source.name]
+    files = [] if source is None else [source, *neighbours(source)]
+    own = [(file, one.lineno) for one in frames for file in files if Path(one.filename).name == file.name]
+    file, line = own[-1] if own else (source, None)
     said = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-    return InputError(f"{where}: {said}", source=source, line=own[-1].lineno if own else None)
+    return InputError(f"{where}: {said}", source=file, line=line)
 
 
 def called(vehicle: LoadedVehicle, name: str, *given: Any) -> np.ndarray:

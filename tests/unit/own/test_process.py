@@ -66,7 +66,6 @@ def test_a_black_box_is_identified_and_a_weaker_heater_is_its_gain(simulator):
     assert loss == pytest.approx(0.3, abs=0.02)
     assert found.better
     write(found, simulator.parent / "identified")
-    (simulator.parent / "identified" / "body.py").write_text((simulator.parent / "body.py").read_text())
     again = load_own(simulator.parent / "identified" / VEHICLE)
     observer = observer_of(again, runs(3, 0.3, 2, factor=0.7))
     chances = Engine(observer, healthy_of(observer)).run().chances
@@ -78,7 +77,6 @@ def test_a_file_that_no_fit_betters_keeps_its_numbers_and_has_what_runs_leave(si
     found = identify(vehicle, [runs(4, 0.2, 1)])
     assert not found.better
     write(found, simulator.parent / "identified")
-    (simulator.parent / "identified" / "body.py").write_text((simulator.parent / "body.py").read_text())
     again = load_own(simulator.parent / "identified" / VEHICLE)
     loss = again.declared.parameters[0]
     far = found.values[0] * found.nuisance[0].spread
