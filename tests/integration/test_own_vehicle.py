@@ -145,6 +145,45 @@ def test_runs_without_a_case_file_are_a_case_where_their_vehicle_is_named(pool):
     assert "neither case.toml nor run*.csv" in empty.stderr
 
 
+BLACK_BOX = """
+import numpy as np
+import mine_model as mine
+inputs, parameters = mine.inputs, mine.parameters
+outputs = [mine.outputs[0] | {"noise": 0.15}, mine.outputs[1] | {"noise": 0.03}]
+def initial(y):
+    return np.nan_to_num(np.array([y["depth"], y["depth_rate"], y["yaw"], y["yaw_rate"]]))
+def rollout(x, t, u, theta):
+    out, still = [], np.zeros(2)
+    for k in range(len(t)):
+        out.append(mine.measure(x, u[k], theta)[:2])
+        h = t[k + 1] - t[k] if k + 1 < len(t) else 0.0
+        x = x + h * mine.derivative(x + 0.5 * h * mine.derivative(x, u[k], still, theta), u[k], still, theta)
+    return np.array(out)
+"""
+
+
+def test_a_black_box_finds_the_numbers_from_noisy_readings_now_and_then(pool):
+    """Depth is read every second, to 0.15 m, the turn's rate never: where windows begin is as well known as that."""
+    folder, case, _ = pool
+    (folder / "box.py").write_text(BLACK_BOX)
+    (folder / "box.toml").write_text(
+        'format = 1\nmodel = "box"\n[sensors.depth]\nnoise = 0.15\ntolerance = 0.15\n'
+        "[sensors.yaw]\nnoise = 0.03\ntolerance = 0.05\n[windows]\nseconds = 10.0\n"
+    )
+
+    def read(n, y):
+        y = y + np.random.default_rng(900 + n).standard_normal(y.shape) * [0.15, 0.03, 0.0]
+        y[np.arange(len(y)) % 10 != 0, 0] = np.nan
+        return y
+
+    case("seldom", 8, runs=10, seconds=60.0, read=read)
+    done = glider("identify", "seldom", "--vehicle", "box.toml", "--out", "boxed", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    for one in json.loads(done.stdout)["parameters"]:
+        if one["name"] in HEALTHY:
+            assert abs(one["mean"] - HEALTHY[one["name"]]) < 3.0 * one["sd"], one
+
+
 def test_a_watch_names_the_run_from_which_it_is_heavier(pool):
     folder, case, _ = pool
     case("season", 5, runs=9, theta_of=lambda n, theta: theta + np.array([0, 0.6, 0, 0, 0]) * (n >= 6))

@@ -72,7 +72,8 @@ def write_case(
         y = y + noise * random.standard_normal(y.shape)
         texts = {"t_s": [f"{value:.3f}" for value in t]}
         texts |= {one.column: [f"{v:.6g}" for v in u[:, k]] for k, one in enumerate(declared.inputs)}
-        texts |= {one.column: [f"{v:.6g}" for v in y[:, k]] for k, one in enumerate(declared.outputs)}
+        texts |= {one.column: ["" if np.isnan(v) else f"{v:.6g}" for v in y[:, k]]
+                  for k, one in enumerate(declared.outputs)}  # fmt: skip
         csvfile.write_table(folder / f"run{n:02d}.csv", texts)
     (folder / "case.toml").write_text(
         f'format = 1\nvehicle = "{vehicle}"\nsite = "simulated"\nlog_rate_hz = {rate}\nruns = {runs}\n'

@@ -16,6 +16,7 @@ from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inp
 from glider.tools.own.load import LoadedVehicle, called, user_error
 from glider.tools.own.operating_points import with_operating_points
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.trends import Trend, trend_of
 
 LEAST_STEP = 0.1  # s between rows
 FIRST_SECONDS = 1.0  # of a run, over which the rate of an output at its start is taken
@@ -58,6 +59,7 @@ class Observer:
     _begun: dict[tuple[int, int, bytes, bytes], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _windows: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _first: dict[tuple[int, int, bytes], dict[str, float]] = field(default_factory=dict)
+    _trends: dict[int, list[Trend]] = field(default_factory=dict)  # of a black box, by run
 
     def __post_init__(self) -> None:
         declared = self.vehicle.declared
@@ -433,6 +435,19 @@ class BlackBox(Observer):
     def _choose_starts(self) -> None:
         return
 
+    def readings(self, n: int, point: ModelPoint, row: int, until: float) -> dict[str, float]:
+        """Value and rate of every output at a row of run n, by readings until a time, with the sensors' errors off."""
+        run, declared, found = self.runs[n], self.declared, dict[str, float]()
+        if n not in self._trends:
+            sigma = np.sqrt(self.point.variance)
+            self._trends[n] = [trend_of(run.t, y, float(s), one.angle) for y, s, one in
+                               zip(run.outputs.T, sigma, declared.outputs, strict=True)]  # fmt: skip
+        for k, (one, trend) in enumerate(zip(declared.outputs, self._trends[n], strict=True)):
+            gain, ((value, rate), _) = point.reading[0, k], trend.at(run.t[row], until)
+            found[one.name] = (value - point.reading[1, k]) / gain if gain else np.nan
+            found[f"{one.name}_rate"] = rate / gain if gain else np.nan
+        return found | ({name: value for name, (value, _) in declared.start.items()} if row == 0 else {})
+
     @property
     def horizon(self) -> float:
         return float(self.declared.horizon or HORIZON[1])
@@ -453,9 +468,11 @@ class BlackBox(Observer):
         for start, end in zip(starts, ends, strict=True):
             begin = int(np.searchsorted(run.t, run.t[start] - warm - 1e-6))
             part = OwnRun(run.name, run.t[begin:end], driven[begin:end], run.outputs[begin:end], run.path)
-            readings = self.first_readings(n, point, begin)
+            readings = self.readings(n, point, begin, max(run.t[start], run.t[begin] + warm))
             x0 = called(self.vehicle, "initial", readings) if hasattr(self.vehicle.model, "initial") else readings
-            flown = np.asarray(called(self.vehicle, "rollout", x0, part.t - part.t[0], part.inputs, point.theta), float)
+            with np.errstate(all="ignore"):  # a model that diverges is far off
+                flown = called(self.vehicle, "rollout", x0, part.t - part.t[0], part.inputs, point.theta)
+            flown = np.asarray(flown, dtype=np.float64)
             if flown.shape != part.outputs.shape:
                 raise InputError(
                     f"rollout: expected {part.outputs.shape} outputs, got {flown.shape}", source=self.vehicle.source
