@@ -53,7 +53,7 @@ def _imported(file: Path) -> Iterator[str]:
     """First names of modules that a Python file imports, the standard library's not; of another kind of file none."""
     if file.suffix != ".py":
         return
-    for one in ast.walk(ast.parse(file.read_bytes())):
+    for one in ast.walk(ast.parse(file.read_bytes(), str(file))):
         names = []
         if isinstance(one, ast.Import):
             names = [each.name for each in one.names]

@@ -58,7 +58,7 @@ class Observer:
     notes: list[str] = field(default_factory=list)
     _begun: dict[tuple[int, int, bytes, bytes], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _windows: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
-    _first: dict[tuple[int, int, bytes], dict[str, float]] = field(default_factory=dict)
+    _first: dict[tuple[int, bytes], dict[str, float]] = field(default_factory=dict)
     _trends: dict[int, list[Trend]] = field(default_factory=dict)  # of a black box, by run
 
     def __post_init__(self) -> None:
@@ -91,22 +91,22 @@ class Observer:
 
     # how a run begins
 
-    def first_readings(self, n: int, point: ModelPoint, row: int = 0) -> dict[str, float]:
-        """First value and rate from a row of run n on, of every output, as the sensors' errors have it; NaN: none."""
-        run, key = self.runs[n], (n, row, point.reading[:2].tobytes())
+    def first_readings(self, n: int, point: ModelPoint) -> dict[str, float]:
+        """First value and rate of every output of run n, as the sensors' errors have it; NaN: none."""
+        run, key = self.runs[n], (n, point.reading[:2].tobytes())
         if key in self._first:
             return dict(self._first[key])
         found: dict[str, float] = {}
-        early = (run.t >= run.t[row]) & (run.t - run.t[row] <= FIRST_SECONDS)
+        early = run.t - run.t[0] <= FIRST_SECONDS
         for k, one in enumerate(self.declared.outputs):
             gain, bias = point.reading[0, k], point.reading[1, k]
             seen = np.flatnonzero(np.isfinite(run.outputs[:, k]) & early & (gain != 0.0))
             values = (run.outputs[seen, k] - bias) / gain
             if one.angle:
                 values = np.unwrap(values)
-            known = self.declared.start.get(one.name) if row == 0 else None
+            known = self.declared.start.get(one.name)
             found[one.name] = known[0] if known else (float(values[0]) if len(seen) else np.nan)
-            when = run.t[seen] - run.t[row]
+            when = run.t[seen] - run.t[0]
             sloped = len(seen) >= 3 and np.ptp(when) > 0.0
             found[f"{one.name}_rate"] = float(np.polyfit(when, values, 1)[0]) if sloped else np.nan
         if len(self._first) < MOST_KEPT:

@@ -37,8 +37,8 @@ def flown(observer, n, starts, ends, states):
     run, point, out = observer.runs[n], observer.point, np.full(observer.runs[n].outputs.shape, np.nan)
     observer.vehicle.kernels.fly_run(
         run.t, held_inputs(observer.declared, run.inputs), starts, ends, states, point.theta, point.own,
-        point.reading, forces(observer.declared, point, run.inputs), observer.kinds, observer.angles, observer.parts,
-        out,
+        point.reading, forces(observer.declared, point, run.t, run.inputs), observer.kinds, observer.angles,
+        observer.parts, out,
     )  # fmt: skip
     return out
 
