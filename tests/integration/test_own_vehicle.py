@@ -1,5 +1,6 @@
 """A vehicle of one's own from its skeleton: checked, identified, diagnosed, watched; nothing of the tree touched."""
 
+import csv
 import json
 import tomllib
 
@@ -143,6 +144,54 @@ def test_runs_without_a_case_file_are_a_case_where_their_vehicle_is_named(pool):
     empty = glider(*command, cwd=folder)
     assert empty.returncode == 2
     assert "neither case.toml nor run*.csv" in empty.stderr
+
+
+MAPPING = """
+format = 1
+vehicle = "mine.toml"
+water_density_kg_m3 = 998.0
+[time]
+column = "stamp"
+unit = "ms"
+[columns.thrust_n]
+source = "Thrust"
+[columns.rudder_rad]
+source = "Rudder (deg)"
+unit = "deg"
+[columns.depth_m]
+source = "Depth"
+unit = "cm"
+[columns.yaw_rad]
+source = "Heading"
+unit = "deg"
+[columns.r_rad_s]
+source = "Turn"
+"""
+LOGGED = {"stamp": ("t_s", 1e3), "Thrust": ("thrust_n", 1.0), "Rudder (deg)": ("rudder_rad", 180.0 / np.pi),
+          "Depth": ("depth_m", 100.0), "Heading": ("yaw_rad", 180.0 / np.pi), "Turn": ("r_rad_s", 1.0)}  # fmt: skip
+
+
+def test_another_log_comes_into_the_columns_that_the_model_declares(pool):
+    folder, case, _ = pool
+    case("ours", 9, runs=2)
+    for run in sorted((folder / "ours").glob("run*.csv")):
+        header, *rows = csv.reader(run.read_text().splitlines())
+        values = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+        log = np.column_stack([values[name] * factor for name, factor in LOGGED.values()])
+        with (folder / f"log_{run.name}").open("w", newline="") as file:
+            csv.writer(file).writerows([list(LOGGED), *log.tolist()])
+    (folder / "map.toml").write_text(MAPPING)
+    logs = sorted(folder.glob("log_run*.csv"))
+    done = glider("import", "csv", *logs, "--map", "map.toml", "--out", "theirs", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    gaps = [json.loads(glider("gap", "measure", case, "--json", cwd=folder).stdout) for case in ("ours", "theirs")]
+    for ours, theirs in zip(*(one["runs"] for one in gaps), strict=True):
+        assert theirs["channels"] == pytest.approx(ours["channels"], rel=1e-6)
+    (folder / "map.toml").write_text(MAPPING.replace("yaw_rad", "psi_rad"))
+    wrong = glider("import", "csv", *logs, "--map", "map.toml", "--out", "wrong", cwd=folder)
+    assert wrong.returncode == 2
+    assert "columns.psi_rad: no column of mine.toml" in wrong.stderr
+    assert not (folder / "wrong").exists()
 
 
 BLACK_BOX = """

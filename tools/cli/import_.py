@@ -47,12 +47,13 @@ def csv(files, mapping, template, out, strict, as_json) -> None:
     """
     from glider.tools.data.importers.csvlog import import_csv
     from glider.tools.data.runs.run import run_name
+    from glider.tools.own.cases import import_target
 
     if _asked_for(template, "template.toml", files, mapping):
         return
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
     check_writable(folder)
-    imported = import_csv(list(files), mapping, folder, strict)
+    imported = import_csv(list(files), mapping, folder, strict, import_target(mapping))
     _say_imported(imported, folder, as_json, {"left_out": imported.left_out})
 
 

@@ -1,12 +1,14 @@
-"""Which vehicle a case is asked by: a file with `model`, by --vehicle or named in case.toml."""
+"""Which vehicle a case is asked by: a file with `model`, by --vehicle or named in case.toml, or in a mapping."""
 
+import tomllib
 from pathlib import Path
 
+from glider.tools.data.importers.mapping import RUN_DATA, Target
 from glider.tools.data.runs.case import CASE_FILE
 from glider.tools.data.sources import read_text
 from glider.tools.own.check import load_own
 from glider.tools.own.files import is_own
-from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.load import LoadedVehicle, read_own
 from glider.tools.own.runs import case_table
 
 
@@ -27,3 +29,19 @@ def own_vehicle(case: Path, wanted: str | None) -> LoadedVehicle | None:
         return None  # the strict reader of cases says what is wrong
     path = folder / named
     return load_own(path) if path.is_file() and is_own(read_text(path)) else None
+
+
+def import_target(mapping: str) -> Target:
+    """The columns into which a mapping file brings a log: those that its vehicle's model declares, if it has one."""
+    path = Path(mapping)
+    try:
+        named = tomllib.loads(read_text(path))["vehicle"] if path.is_file() else ""
+    except (ValueError, KeyError):
+        return RUN_DATA  # its reader says what is wrong
+    for file in (path.parent / str(named), Path(str(named))):
+        if file.is_file() and is_own(read_text(file)):
+            declared = read_own(file).declared
+            columns = (*(one.column for one in declared.inputs), *(one.column for one in declared.outputs))
+            held = frozenset(one.column for one in declared.inputs if not one.interpolated)
+            return Target(columns, held, frozenset(one.column for one in declared.outputs if one.angle), file)
+    return RUN_DATA

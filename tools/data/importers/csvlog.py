@@ -1,6 +1,7 @@
 """Anybody's CSV log into run data, by a mapping file."""
 
 import fnmatch
+import os
 import re
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -14,7 +15,7 @@ from glider.hal.units import units_of
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers import resample
 from glider.tools.data.importers.commands import CommandTable, rebuild, says, seen_direction
-from glider.tools.data.importers.mapping import TIME_UNITS, ColumnTable, CutTable, MapTable, load_map
+from glider.tools.data.importers.mapping import RUN_DATA, TIME_UNITS, ColumnTable, CutTable, MapTable, Target, load_map
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.case import write_case
@@ -40,23 +41,28 @@ class Imported:
     notes: list[str] = field(default_factory=list)
 
 
-def import_csv(paths: list[Path], map_name: str, out: Path, strict: bool = False) -> Imported:
+def import_csv(
+    paths: list[Path], map_name: str, out: Path, strict: bool = False, target: Target = RUN_DATA
+) -> Imported:
     """Write the files as the runs of a case; InputError or ConfigError, one line, where that cannot be.
 
-    strict: no row is left out, whatever the mapping allows.
+    strict: no row is left out, whatever the mapping allows; target: the columns that its vehicle has.
     """
-    mapping, base = load_map(map_name)
+    mapping, base = load_map(map_name, target)
     if strict:
         text = msgspec.structs.replace(mapping.text, broken_rows="refuse", bad_fields="refuse")
         time = msgspec.structs.replace(mapping.time, not_increasing="refuse")
         mapping = msgspec.structs.replace(mapping, text=text, time=time)
     vehicle, vehicle_text = mapping.vehicle, None
-    if vehicle not in shipped("model/vehicles"):
+    if target.vehicle is not None:
+        vehicle = os.path.relpath(target.vehicle.resolve(), out.resolve())
+    elif vehicle not in shipped("model/vehicles"):
         vehicle_text, _ = name_or_path(vehicle, "vehicle", "model/vehicles", base=base)
-    sources = [_Source(path, mapping) for path in paths]
+    sources = [_Source(path, mapping, target) for path in paths]
     runs = [source.run(f"run{number:02d}") for number, source in enumerate(sources)]
     notes = [note for source in sources for note in source.said()]
-    refuse_impossible(runs)
+    if target.vehicle is None:
+        refuse_impossible(runs)
     rate = mapping.rate_hz
     if rate is None:
         steps = np.concatenate([np.diff(run.t) for run in runs])
@@ -77,8 +83,8 @@ def import_csv(paths: list[Path], map_name: str, out: Path, strict: bool = False
 class _Source:
     """One file on its way to a run: its table, the rows that are good, and why the others are not."""
 
-    def __init__(self, path: Path, mapping: MapTable):
-        self.path, self.mapping = path, mapping
+    def __init__(self, path: Path, mapping: MapTable, target: Target):
+        self.path, self.mapping, self.target = path, mapping, target
         self.table = csvfile.read_table(path, mapping.text)
         self.everything = {**mapping.columns, **mapping.extra}
         states = [s for c in mapping.commands.values() for s in (c.to_low, c.to_high) if s is not None]
@@ -134,12 +140,12 @@ class _Source:
                 self.notes.append("no [[cut]] is for a file of this name; it is taken whole")
         values = {target: self._converted(target, item) for target, item in self.everything.items()}
         values |= {target: self._rebuilt(target, command, values) for target, command in mapping.commands.items()}
-        columns = _rows(self.path, self.t, values, cut, mapping)
+        columns = _rows(self.path, self.t, values, cut, mapping, self.target)
         if mapping.rates_from_attitude:
             rates = resample.body_rates(columns[names.TIME], *(columns[angle] for angle in names.ATTITUDE))
             columns |= {rate: found for rate, found in zip(names.RATES, rates, strict=True) if rate not in columns}
         self._note_atmosphere(columns.get(names.DEPTH))
-        numbers = {target: columns[target] for target in names.in_order(list(columns)) if target in names.KNOWN}
+        numbers = {name: columns[name] for name in (names.TIME, *self.target.columns) if name in columns}
         extra = {
             target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()
         }
@@ -242,7 +248,7 @@ class _Source:
 
 
 def _rows(
-    path: Path, t: np.ndarray, values: dict[str, np.ndarray], cut: CutTable, mapping: MapTable
+    path: Path, t: np.ndarray, values: dict[str, np.ndarray], cut: CutTable, mapping: MapTable, target: Target
 ) -> dict[str, np.ndarray]:
     """The run's columns, t_s first: even means at rate_hz, or the rows as they are."""
     end = t[-1] if cut.end_s is None else cut.end_s
@@ -263,10 +269,10 @@ def _rows(
     grid = np.arange(count) / mapping.rate_hz
     columns = {names.TIME: grid}
     for name, column in values.items():
-        if name in names.COMMANDS:
+        if name in target.held:
             columns[name] = resample.zero_order_hold(t, column, grid + cut.start_s)
             continue
-        angle = name in names.WRAPPING
+        angle = name in target.angles
         mean = resample.means(column, bins, count, angle)
         columns[name] = resample.fill_gaps(mean, grid + cut.start_s, t, column, mapping.max_gap_s, angle)
     return columns

@@ -7,6 +7,8 @@ docs/how-to/import.md explains every key with an example.
 
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -30,6 +32,19 @@ TIME_UNITS = {name: UNITS[name].factor for name in units_of("time")}
 _KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length"), (names.OIL, "volume"))
 
 Factor = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
+
+
+@dataclass(frozen=True)
+class Target:
+    """The columns that a log is brought into: those of run data, or those that a user's model declares."""
+
+    columns: tuple[str, ...] = names.ALL  # in the order in which they are written
+    held: frozenset[str] = frozenset(names.COMMANDS)  # stay until they are given again
+    angles: frozenset[str] = names.WRAPPING
+    vehicle: Path | None = None  # file of a user's model
+
+
+RUN_DATA = Target()
 
 
 class ConversionTable(Table):
@@ -122,13 +137,14 @@ _BY_NAME = {"columns": ColumnTable, "extra": ColumnTable, "commands": CommandTab
 M = TypeVar("M", bound=Table)
 
 
-def check_columns(columns: Mapping[str, ConversionTable], source: str) -> None:
-    """ConfigError where a column is none of run data, or its unit measures something else."""
+def check_columns(columns: Mapping[str, ConversionTable], source: str, target: Target = RUN_DATA) -> None:
+    """ConfigError where a column is none of the target's, or its unit measures something else."""
     for name, column in columns.items():
-        if name not in names.KNOWN or name == names.TIME:
-            known = ", ".join(sorted(names.KNOWN - {names.TIME}))
+        if name not in target.columns or name == names.TIME:
+            known = ", ".join(sorted({*target.columns} - {names.TIME}))
+            whose = "run data" if target.vehicle is None else target.vehicle.name
             raise ConfigError(
-                source, f"no column of run data (put it in [extra], or use {known})", key=f"columns.{name}"
+                source, f"no column of {whose} (put it in [extra], or use {known})", key=f"columns.{name}"
             )
         wanted = next((kind for ending, kind in _KINDS if name.endswith(ending)), "counts")
         kind = UNITS[column.unit].kind
@@ -137,11 +153,11 @@ def check_columns(columns: Mapping[str, ConversionTable], source: str) -> None:
             raise ConfigError(source, f"{column.unit!r} is no unit of {wanted}", key=f"columns.{name}.unit")
 
 
-def _check(mapping: MapTable, source: str) -> None:
+def _check(mapping: MapTable, source: str, target: Target) -> None:
     """What no single table can see; ConfigError."""
-    check_columns(mapping.columns, source)
+    check_columns(mapping.columns, source, target)
     for name in mapping.extra:
-        if name in names.KNOWN or not name.strip():
+        if name in target.columns or not name.strip():
             raise ConfigError(source, "the name is taken by a column of run data", key=f"extra.{name}")
     for name, command in mapping.commands.items():
         if name not in names.COMMANDS or name in mapping.columns:
@@ -156,9 +172,9 @@ def _check(mapping: MapTable, source: str) -> None:
         raise ConfigError(source, "needs rate_hz: a log taken row by row has no gaps to fill", key="max_gap_s")
 
 
-def decode_map(text: str, source: str) -> MapTable:
+def decode_map(text: str, source: str, target: Target = RUN_DATA) -> MapTable:
     """A mapping file's text; raises ConfigError with file, line and key."""
-    return decode_checked(text, source, MapTable, _check, _BY_NAME)
+    return decode_checked(text, source, MapTable, partial(_check, target=target), _BY_NAME)
 
 
 def decode_checked(
@@ -210,9 +226,9 @@ def write_template(path: Path, name: str) -> None:
     write_bytes(path, files("glider.tools.data.importers").joinpath(name).read_bytes())
 
 
-def load_map(wanted: str) -> tuple[MapTable, Path]:
+def load_map(wanted: str, target: Target = RUN_DATA) -> tuple[MapTable, Path]:
     """A mapping by shipped name or by path, and the folder that its vehicle file is looked for in."""
-    return load_mapping(wanted, "maps", decode_map)
+    return load_mapping(wanted, "maps", partial(decode_map, target=target))
 
 
 def load_mapping(wanted: str, folder: str, decode_text: Callable[[str, str], M]) -> tuple[M, Path]:

@@ -26,7 +26,7 @@ class Column:
 def overview(runs: Sequence[Run]) -> list[Column]:
     """The columns of the runs, in the order of run data."""
     found = []
-    for name in (one for one in names.ALL if any(one in run.columns for run in runs)):
+    for name in names.in_order(list(dict.fromkeys(one for run in runs for one in run.columns))):
         values = np.concatenate([run.columns.get(name, np.full(run.rows, np.nan)) for run in runs])
         seen = values[np.isfinite(values)]
         unit = next((unit for ending, unit in UNITS if name.endswith(ending)), "1")
