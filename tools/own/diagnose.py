@@ -16,7 +16,8 @@ from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.model_files import moved_to
-from glider.tools.own.observer import Observer, observer_of
+from glider.tools.own.observer import Observer
+from glider.tools.own.observers import observer_of
 from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
 

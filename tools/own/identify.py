@@ -32,7 +32,8 @@ from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, inflation
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.noise_levels import fit_levels
-from glider.tools.own.observer import Observer, observer_of
+from glider.tools.own.observer import Observer
+from glider.tools.own.observers import observer_of
 from glider.tools.own.operating_points import input_shares
 from glider.tools.own.persistence import channel_scores, persistence
 from glider.tools.own.runs import OwnRun

@@ -9,7 +9,7 @@ import numpy as np
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.columns import TIME
 from glider.tools.own.load import LoadedVehicle
-from glider.tools.own.observer import observer_of
+from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 
 

@@ -4,7 +4,7 @@ import contextlib
 import copy
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,8 @@ from glider.tools.own import kernels as names
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
 from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs, nominal_point
 from glider.tools.own.load import LoadedVehicle, called, user_error
-from glider.tools.own.operating_points import with_operating_points
 from glider.tools.own.runs import OwnRun
-from glider.tools.own.trends import Trend, trend_of
 
-LEAST_STEP = 0.1  # s between rows
 FIRST_SECONDS = 1.0  # of a run, over which the rate of an output at its start is taken
 PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which steps and half steps may differ
 HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
@@ -59,7 +56,6 @@ class Observer:
     _begun: dict[tuple[int, int, bytes, bytes], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _windows: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _first: dict[tuple[int, bytes], dict[str, float]] = field(default_factory=dict)
-    _trends: dict[int, list[Trend]] = field(default_factory=dict)  # of a black box, by run
 
     def __post_init__(self) -> None:
         declared = self.vehicle.declared
@@ -424,77 +420,3 @@ def _range_share(runs: Sequence[OwnRun], n: int) -> float:
     values = np.concatenate([run.outputs[:, n] for run in runs])
     values = values[np.isfinite(values)]
     return float(np.ptp(values)) / 20.0 or 1.0 if len(values) else 1.0
-
-
-class BlackBox(Observer):
-    """A model that is only rolled out: windows begin where its `initial` puts them by the warm-up's readings."""
-
-    def _choose_parts(self) -> None:
-        self.kinds, self.scales = np.zeros(0, dtype=int), np.zeros(0)
-
-    def _choose_starts(self) -> None:
-        return
-
-    def readings(self, n: int, point: ModelPoint, row: int, until: float) -> dict[str, float]:
-        """Value and rate of every output at a row of run n, by readings until a time, with the sensors' errors off."""
-        run, declared, found = self.runs[n], self.declared, dict[str, float]()
-        if n not in self._trends:
-            sigma = np.sqrt(self.point.variance)
-            self._trends[n] = [trend_of(run.t, y, float(s), one.angle) for y, s, one in
-                               zip(run.outputs.T, sigma, declared.outputs, strict=True)]  # fmt: skip
-        for k, (one, trend) in enumerate(zip(declared.outputs, self._trends[n], strict=True)):
-            gain, ((value, rate), _) = point.reading[0, k], trend.at(run.t[row], until)
-            found[one.name] = (value - point.reading[1, k]) / gain if gain else np.nan
-            found[f"{one.name}_rate"] = rate / gain if gain else np.nan
-        return found | ({name: value for name, (value, _) in declared.start.items()} if row == 0 else {})
-
-    @property
-    def horizon(self) -> float:
-        return float(self.declared.horizon or HORIZON[1])
-
-    def filter(self, n: int, point: ModelPoint, covariances: bool = False) -> Filtered:
-        rows = len(self.runs[n].t)
-        return Filtered(0.0, 0.0, 1, np.zeros((rows, 0, 0)), np.zeros((rows, 0)), np.zeros((0, 0, 0)))
-
-    def follow(self, n: int, point: ModelPoint, by: Filtered, rows: int | None = None) -> np.ndarray:
-        return by.states
-
-    def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:
-        run = self.runs[n]
-        driven = driven_inputs(run, self.declared, point)
-        out = np.full(run.outputs.shape, np.nan)
-        starts, ends = self.windows(n, horizon)
-        warm = min(WARM_UP, WARM_UP_SHARE * horizon)
-        for start, end in zip(starts, ends, strict=True):
-            begin = int(np.searchsorted(run.t, run.t[start] - warm - 1e-6))
-            part = OwnRun(run.name, run.t[begin:end], driven[begin:end], run.outputs[begin:end], run.path)
-            readings = self.readings(n, point, begin, max(run.t[start], run.t[begin] + warm))
-            x0 = called(self.vehicle, "initial", readings) if hasattr(self.vehicle.model, "initial") else readings
-            with np.errstate(all="ignore"):  # a model that diverges is far off
-                flown = called(self.vehicle, "rollout", x0, part.t - part.t[0], part.inputs, point.theta)
-            flown = np.asarray(flown, dtype=np.float64)
-            if flown.shape != part.outputs.shape:
-                raise InputError(
-                    f"rollout: expected {part.outputs.shape} outputs, got {flown.shape}", source=self.vehicle.source
-                )
-            lagged, history = np.zeros(flown.shape[1]), np.zeros(flown.shape)
-            for row, h in enumerate(flown):
-                out[begin + row] = names.read(h, part.t[row], row, part.t, lagged, history, self.angles, point.reading)
-            out[begin:start] = np.nan
-        return out
-
-    def predicted(self, n: int) -> np.ndarray:
-        return self.predict(n, self.point, self.horizon, np.zeros((0, 0)))
-
-
-def observer_of(vehicle: LoadedVehicle, runs: Sequence[OwnRun], every_row: bool = False) -> Observer:
-    """The observer of a vehicle's model over runs: on rows LEAST_STEP apart at least, or on every row."""
-    chosen = list(runs) if every_row else [thinned(run) for run in runs]
-    vehicle = replace(vehicle, declared=with_operating_points(vehicle.declared, chosen))
-    return (Observer if vehicle.level else BlackBox)(vehicle, chosen)
-
-
-def thinned(run: OwnRun) -> OwnRun:
-    """Every so many-th row of a run that was logged faster than its motion needs."""
-    step = max(1, round(LEAST_STEP / max(float(np.median(np.diff(run.t))), 1e-9)))
-    return run if step == 1 else replace(run, t=run.t[::step], inputs=run.inputs[::step], outputs=run.outputs[::step])

@@ -11,7 +11,7 @@ from glider.tools.own.check import load_own
 from glider.tools.own.declare import USUAL_TOLERANCE
 from glider.tools.own.effects import noise_effects, standard_effects
 from glider.tools.own.files import is_own
-from glider.tools.own.observer import observer_of
+from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun, load_own_runs
 
 ASKED = {

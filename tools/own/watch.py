@@ -28,7 +28,7 @@ from glider.tools.own.decision import (
 from glider.tools.own.effects import FORM, UNEXPLAINED
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.load import LoadedVehicle
-from glider.tools.own.observer import observer_of
+from glider.tools.own.observers import observer_of
 from glider.tools.own.posterior import STRONG_LEFT, under_priors
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.sessions import Session, SessionRuns, split

@@ -12,7 +12,7 @@ from glider.tools.own.healthy import healthy_of
 from glider.tools.own.hierarchy import ChannelErrors, expand, multiples_of_pushes
 from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
-from glider.tools.own.observer import observer_of
+from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 from tests.support.boat import MODEL
 

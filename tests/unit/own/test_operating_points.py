@@ -13,7 +13,7 @@ from glider.tools.own.declare import Declaration, Input
 from glider.tools.own.diagnose import diagnose_own
 from glider.tools.own.identified import write
 from glider.tools.own.identify import identify
-from glider.tools.own.observer import observer_of
+from glider.tools.own.observers import observer_of
 from glider.tools.own.operating_points import (
     KERNEL_LENGTH,
     NEW_POINT_VARIANCE,

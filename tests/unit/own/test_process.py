@@ -11,7 +11,7 @@ from glider.tools.own.check import load_own
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identify import identify
-from glider.tools.own.observer import observer_of
+from glider.tools.own.observers import observer_of
 from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
 
