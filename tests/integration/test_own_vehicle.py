@@ -10,7 +10,7 @@ import pytest
 from tests.support.commands import glider
 from tests.support.own_vehicle import module_of, write_case
 
-pytestmark = pytest.mark.computes(seconds=50)
+pytestmark = pytest.mark.computes(seconds=65)
 
 HEALTHY = {"weight_in_water": 0.8, "heave_drag": 38.0, "turn_rate_per_rudder": -0.4, "yaw_damping": 0.75}
 

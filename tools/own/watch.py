@@ -171,7 +171,7 @@ class Watch(WatchedRuns):
         """
         found, best = dict[tuple[str, int, int], Refit](), None
 
-        def refit(one: Place, starts: dict[int, float]) -> None:
+        def add(one: Place, starts: dict[int, float]) -> None:
             for k, start in starts.items():
                 new = self.refit(one.span, k, start, one.sessions)
                 key = (new.event.label, *one.span)
@@ -182,7 +182,7 @@ class Watch(WatchedRuns):
             starts, runs = {int(k): 0.0 for k in np.argsort(one.scores)[::-1][:REFITTED]}, range(*one.span)
             if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
                 starts |= dict(self.strong_sizes(runs)[:REFITTED])
-            refit(one, starts)
+            add(one, starts)
         while found and (leading := max(found.values(), key=lambda one: one.score)) is not best:
             if leading.score + np.log(self.named) + self.change_odds < 0.0:
                 break
@@ -191,12 +191,12 @@ class Watch(WatchedRuns):
             known = np.array([found[key].score if (key := (one.label, *span)) in found else -np.inf
                               for one in self.healthy.effects])  # fmt: skip
             likely = predicted > np.maximum(known, best.score - UNLIKELY)
-            refit(Place(span, best.sessions, predicted), {int(k): float(size[k]) for k in np.flatnonzero(likely)})
+            add(Place(span, best.sessions, predicted), {int(k): float(size[k]) for k in np.flatnonzero(likely)})
             most = max(one.score for one in found.values())
             of_span = [one for (_, *at), one in found.items() if tuple(at) == span and one.score > most - UNLIKELY]
             for one in places:
-                refit(one, {int(self.healthy.at([other.event.label])[0]): other.event.size for other in of_span
-                            if (other.event.label, *one.span) not in found})  # fmt: skip
+                add(one, {int(self.healthy.at([other.event.label])[0]): other.event.size for other in of_span
+                          if (other.event.label, *one.span) not in found})  # fmt: skip
         return list(found.values())
 
     def decided(self, found: Sequence[Refit]) -> tuple[Refit, dict[str, float]]:
