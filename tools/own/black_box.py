@@ -15,7 +15,7 @@ from glider.tools.own.trends import Trend, trend_of
 
 @dataclass
 class BlackBox(Observer):
-    """A model that is only rolled out: windows begin where its `initial` puts them by the warm-up's readings."""
+    """A model that is only rolled out: its `initial` says where a window begins, by readings until its warm-up ends."""
 
     _trends: dict[int, list[Trend]] = field(default_factory=dict)  # by run
 

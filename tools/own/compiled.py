@@ -102,7 +102,7 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
     # the model may call the tree's own kernels
     versions = (numba.__version__ + jit.kernels_digest()).encode()
     texts = {one.relative_to(path.parent): one.read_bytes() for one in (path, *neighbours(path))}
-    key = hashlib.sha256(b"".join(texts.values()) + source.encode() + versions).hexdigest()[:20]
+    key = hashlib.sha256(repr(texts).encode() + source.encode() + versions).hexdigest()[:20]
     folder = jit.cache_root() / "own" / key
     kept, kernels = folder / path.name, folder / "observer_kernels.py"
     for file, text in (*((folder / name, text) for name, text in texts.items()), (kernels, source.encode())):

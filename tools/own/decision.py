@@ -169,17 +169,12 @@ def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray,
         for n, (label, k) in enumerate(zip(one.labels, healthy.at(one.labels), strict=True)):
             if own - {label} not in gained:
                 continue
+            about = healthy, k, float(reach[k]), float(one.sizes[n]), float(one.sd[n]), runs
+            (usual, all_of_it), (both, _) = usual_share(*about), usual_share(*about, float(moves.sum() - moves[n]))
             gain = gained[own] - gained[own - {label}]
-
-            def share(moved: float, n: int = n, k: int = k, gain: float = gain, one: Hypothesis = one) -> float:
-                nat, all_of_it = usual_share(
-                    healthy, k, float(reach[k]), float(one.sizes[n]), float(one.sd[n]), runs, moved
-                )
-                return nat * (float(np.clip(gain / all_of_it, 0.0, 1.0)) if all_of_it > 0.0 else 1.0)
-
-            usual = share(0.0)
-            most[own - {label}] = max(most[own - {label}], usual)
-            by_form[own] = max(by_form[own], share(float(moves.sum() - moves[n])) - usual)
+            part = float(np.clip(gain / all_of_it, 0.0, 1.0)) if all_of_it > 0.0 else 1.0
+            most[own - {label}] = max(most[own - {label}], part * usual)
+            by_form[own] = max(by_form[own], part * (both - usual))
     return np.array([one.evidence + most[frozenset(one.labels)] - by_form[frozenset(one.labels)] for one in every])
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from glider.tools.data.files import write_files
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.own.decision import NONE, UNKNOWN, Healthy, Hypothesis, Posterior, confounded, group_of
@@ -15,7 +14,7 @@ from glider.tools.own.effects import NOISE, UNEXPLAINED, ModelPoint
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
-from glider.tools.own.model_files import moved_to
+from glider.tools.own.model_files import moved_to, write_with_folders
 from glider.tools.own.observer import Observer
 from glider.tools.own.observers import observer_of
 from glider.tools.own.posterior import Engine
@@ -191,9 +190,7 @@ def write(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
     if not given["corrections"]:
         del given["corrections"]
     files[out / CORRECTED] = toml_text(given).encode("utf-8")
-    for one in files:
-        one.parent.mkdir(parents=True, exist_ok=True)
-    write_files(files)
+    write_with_folders(files)
     return answer
 
 

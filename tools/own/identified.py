@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from glider.tools.data.files import write_files
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
 from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.identify import Identified
-from glider.tools.own.model_files import moved_to
+from glider.tools.own.model_files import moved_to, write_with_folders
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
 
@@ -179,6 +178,4 @@ def write(found: Identified, out: Path) -> None:
         out / VEHICLE: toml_text(vehicle).encode("utf-8"),
         out / ANSWER: (json.dumps(as_plain(plain(found)), indent=1) + "\n").encode("utf-8"),
     }
-    for one in files:
-        one.parent.mkdir(parents=True, exist_ok=True)
-    write_files(files)
+    write_with_folders(files)

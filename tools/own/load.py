@@ -98,7 +98,7 @@ def _import(wanted: str, folder: Path, wrong: Callable[[str], ConfigError]) -> t
     if wanted.endswith(".fmu"):
         from glider.tools.own.fmu import FmuModel
 
-        file = (folder / wanted).resolve()
+        file = folder.resolve() / wanted
         if not file.is_file():
             raise wrong(f"no file {wanted} beside it")
         return FmuModel(file), file, ""
@@ -114,7 +114,7 @@ def _import(wanted: str, folder: Path, wrong: Callable[[str], ConfigError]) -> t
             )
         wanted = found[0].value
     module_name, _, attribute = wanted.partition(":")
-    file = (folder / f"{module_name}.py").resolve()
+    file = folder.resolve() / f"{module_name}.py"
     try:
         if file.is_file():
             name = f"glider_own_given_{abs(hash(str(file)))}"

@@ -29,6 +29,7 @@ MODEL = """
         import numpy
         return numpy.array([y["speed"]]), numpy.array([0.02])
 """
+QUADRATIC = "def quadratic(drag, v):\n    return drag * abs(v) * v"
 FILES = {
     "boat.py": MODEL,
     "drags.py": """
@@ -98,6 +99,22 @@ def test_an_error_in_one_of_them_names_that_file_and_its_line(boat):
     (boat / "parts" / "units.py").write_text("import math\ndef size(drag):\n    return math.sqrt(-1.0 - drag)\n")
     with pytest.raises(InputError, match=r"units\.py:3: .*ValueError"):
         load_own(boat / "boat.toml")
+
+
+@pytest.mark.parametrize("linked", [True, False])
+def test_a_model_that_lies_elsewhere_is_found_from_where_its_vehicle_is_written(boat, healthy, linked):
+    """By a link beside its vehicle, or named by its path."""
+    (boat / "vehicles").mkdir()
+    text = (boat / "boat.toml").read_text()
+    if linked:
+        (boat / "vehicles" / "boat.py").symlink_to(boat / "alone.py")
+    (boat / "alone.py").write_text(textwrap.dedent(MODEL).replace("from drags import quadratic", QUADRATIC)
+                                   .replace("from parts import units", "").replace("units.MASS", "3.0"))  # fmt: skip
+    (boat / "vehicles" / "boat.toml").write_text(text if linked else text.replace('"boat"', '"../alone"'))
+    done = glider("identify", healthy, "--vehicle", "vehicles/boat.toml", "--out", "deep/identified", cwd=boat)
+    assert done.returncode == 0, done.stderr
+    asked = glider("gap", "measure", healthy, "--vehicle", "deep/identified/identified.toml", "--json", cwd=boat)
+    assert asked.returncode == 0, asked.stderr
 
 
 def test_all_of_it_is_taken_along_where_a_vehicle_is_written(boat, healthy, tmp_path_factory):

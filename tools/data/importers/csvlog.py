@@ -41,27 +41,25 @@ class Imported:
     notes: list[str] = field(default_factory=list)
 
 
-def import_csv(
-    paths: list[Path], map_name: str, out: Path, strict: bool = False, target: Target = RUN_DATA
-) -> Imported:
+def import_csv(paths: list[Path], map_name: str, out: Path, strict: bool = False, into: Target = RUN_DATA) -> Imported:
     """Write the files as the runs of a case; InputError or ConfigError, one line, where that cannot be.
 
-    strict: no row is left out, whatever the mapping allows; target: the columns that its vehicle has.
+    strict: no row is left out, whatever the mapping allows; into: the columns that its vehicle has.
     """
-    mapping, base = load_map(map_name, target)
+    mapping, base = load_map(map_name, into)
     if strict:
         text = msgspec.structs.replace(mapping.text, broken_rows="refuse", bad_fields="refuse")
         time = msgspec.structs.replace(mapping.time, not_increasing="refuse")
         mapping = msgspec.structs.replace(mapping, text=text, time=time)
     vehicle, vehicle_text = mapping.vehicle, None
-    if target.vehicle is not None:
-        vehicle = os.path.relpath(target.vehicle.resolve(), out.resolve())
+    if into.vehicle is not None:
+        vehicle = os.path.relpath(into.vehicle.resolve(), out.resolve())
     elif vehicle not in shipped("model/vehicles"):
         vehicle_text, _ = name_or_path(vehicle, "vehicle", "model/vehicles", base=base)
-    sources = [_Source(path, mapping, target) for path in paths]
+    sources = [_Source(path, mapping, into) for path in paths]
     runs = [source.run(f"run{number:02d}") for number, source in enumerate(sources)]
     notes = [note for source in sources for note in source.said()]
-    if target.vehicle is None:
+    if into.vehicle is None:
         refuse_impossible(runs)
     rate = mapping.rate_hz
     if rate is None:
@@ -83,8 +81,8 @@ def import_csv(
 class _Source:
     """One file on its way to a run: its table, the rows that are good, and why the others are not."""
 
-    def __init__(self, path: Path, mapping: MapTable, target: Target):
-        self.path, self.mapping, self.target = path, mapping, target
+    def __init__(self, path: Path, mapping: MapTable, into: Target):
+        self.path, self.mapping, self.into = path, mapping, into
         self.table = csvfile.read_table(path, mapping.text)
         self.everything = {**mapping.columns, **mapping.extra}
         states = [s for c in mapping.commands.values() for s in (c.to_low, c.to_high) if s is not None]
@@ -140,12 +138,12 @@ class _Source:
                 self.notes.append("no [[cut]] is for a file of this name; it is taken whole")
         values = {target: self._converted(target, item) for target, item in self.everything.items()}
         values |= {target: self._rebuilt(target, command, values) for target, command in mapping.commands.items()}
-        columns = _rows(self.path, self.t, values, cut, mapping, self.target)
+        columns = _rows(self.path, self.t, values, cut, mapping, self.into)
         if mapping.rates_from_attitude:
             rates = resample.body_rates(columns[names.TIME], *(columns[angle] for angle in names.ATTITUDE))
             columns |= {rate: found for rate, found in zip(names.RATES, rates, strict=True) if rate not in columns}
         self._note_atmosphere(columns.get(names.DEPTH))
-        numbers = {name: columns[name] for name in (names.TIME, *self.target.columns) if name in columns}
+        numbers = {name: columns[name] for name in (names.TIME, *self.into.columns) if name in columns}
         extra = {
             target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()
         }
@@ -248,7 +246,7 @@ class _Source:
 
 
 def _rows(
-    path: Path, t: np.ndarray, values: dict[str, np.ndarray], cut: CutTable, mapping: MapTable, target: Target
+    path: Path, t: np.ndarray, values: dict[str, np.ndarray], cut: CutTable, mapping: MapTable, into: Target
 ) -> dict[str, np.ndarray]:
     """The run's columns, t_s first: even means at rate_hz, or the rows as they are."""
     end = t[-1] if cut.end_s is None else cut.end_s
@@ -269,10 +267,10 @@ def _rows(
     grid = np.arange(count) / mapping.rate_hz
     columns = {names.TIME: grid}
     for name, column in values.items():
-        if name in target.held:
+        if name in into.held:
             columns[name] = resample.zero_order_hold(t, column, grid + cut.start_s)
             continue
-        angle = name in target.angles
+        angle = name in into.angles
         mean = resample.means(column, bins, count, angle)
         columns[name] = resample.fill_gaps(mean, grid + cut.start_s, t, column, mapping.max_gap_s, angle)
     return columns
