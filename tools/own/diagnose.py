@@ -14,6 +14,7 @@ from glider.tools.own.effects import NOISE, UNEXPLAINED, ModelPoint
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.measure import gap_row
 from glider.tools.own.model_files import moved_to, write_with_folders
 from glider.tools.own.observer import Observer
 from glider.tools.own.observers import observer_of
@@ -134,11 +135,7 @@ def _gaps(observer: Observer, healthy: Healthy, chosen: Hypothesis, selected: Se
     runs = {name: np.sqrt(np.nanmean(one**2, axis=1)) for name, one in tables.items()}
     floor = healthy.errors.scales
 
-    def row(table: np.ndarray) -> dict[str, float | None]:
-        by = [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else None for column in table.T]
-        return {**dict(zip(names, by, strict=True)), "total": float(np.sqrt(np.nanmean(table**2)))}
-
-    gap: dict[str, Any] = {name: row(table) for name, table in tables.items()}
+    gap: dict[str, Any] = {name: gap_row(names, table) for name, table in tables.items()}
     gap["floor"] = {**dict(zip(names, map(float, floor), strict=True)), "total": float(np.sqrt(np.mean(floor**2)))}
     # noise is not predicted: it shrinks no gap
     shrinking = any(one.family != NOISE for one in healthy.effects if one.label in selected)

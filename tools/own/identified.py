@@ -12,6 +12,7 @@ from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
 from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.identify import Identified
+from glider.tools.own.measure import gap_row
 from glider.tools.own.model_files import moved_to, write_with_folders
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
@@ -125,15 +126,11 @@ def plain(found: Identified) -> dict[str, Any]:
         rows.append({"name": one.label, "mean": mean, "sd": error, "ci90": ends, "unit": one.unit, "file": start,
                      "runs": runs})  # fmt: skip
     names = [one.name for one in found.vehicle.declared.outputs]
-
-    def gap(table: np.ndarray) -> dict[str, float | None]:
-        by = [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else None for column in table.T]
-        return {**dict(zip(names, by, strict=True)), "total": float(np.sqrt(np.nanmean(table**2)))}
-
     return {
         "format": 1, "vehicle": found.vehicle.name, "parameters": rows, "groups": groups(found),
         "operating_points": {"count": len(found.vehicle.declared.operating_points), "scatter": _operating(found)},
-        "gap": {"before": gap(found.before), "after": gap(found.after)}, "horizon_s": found.observer.horizon,
+        "gap": {"before": gap_row(names, found.before), "after": gap_row(names, found.after)},
+        "horizon_s": found.observer.horizon,
         "handed_out": "identified" if found.better else "file",
         "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes],
     }  # fmt: skip

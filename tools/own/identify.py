@@ -31,6 +31,7 @@ from glider.tools.own.error_components import Components, Whitening, independenc
 from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, inflation
 from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.measure import channel_rms, total_rms
 from glider.tools.own.noise_levels import fit_levels
 from glider.tools.own.observer import Observer
 from glider.tools.own.observers import observer_of
@@ -82,7 +83,7 @@ class Identified:
     @property
     def better(self) -> bool:
         """Whether runs left out are predicted no worse than by the file."""
-        return _total(self.after) <= _total(self.before)
+        return total_rms(self.after) <= total_rms(self.before)
 
     @property
     def handed_out(self) -> tuple[np.ndarray, np.ndarray]:
@@ -140,8 +141,8 @@ def identify(
     scatter = np.where([one.family == PUSH for one in nuisance], np.minimum(usual, USUAL_SCATTER), usual)
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
-    say(f"{count} runs, {k} numbers; the file's model misses them by {_total(before):.2f} tolerances")
-    scales = np.maximum(np.sqrt(np.nanmean(before**2, axis=0)), LEAST_SCALE)
+    say(f"{count} runs, {k} numbers; the file's model misses them by {total_rms(before):.2f} tolerances")
+    scales = np.maximum(channel_rms(before), LEAST_SCALE)
     errors = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales)))
     fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter)
     fit = fit.led_at_levels(say)
@@ -294,7 +295,3 @@ def _held_out(observer, nuisance, values, limits) -> np.ndarray:
     """Gaps (runs, outputs) of every run by a model of the others, whose values (runs, nuisance) are."""
     points = [moved(observer.declared, observer.point, nuisance, np.clip(one, *limits)) for one in values]
     return np.array([observer.gaps(n, point, observer.horizon) for n, point in enumerate(points)])
-
-
-def _total(gaps: np.ndarray) -> float:
-    return float(np.sqrt(np.nanmean(gaps**2)))

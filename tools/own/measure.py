@@ -13,6 +13,24 @@ from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 
 
+def channel_rms(table: np.ndarray) -> np.ndarray:
+    """Root mean square of every column of a table (rows, outputs): (outputs,), NaN where nothing was measured."""
+    read, found = np.isfinite(table).any(axis=0), np.full(table.shape[1], np.nan)
+    found[read] = np.sqrt(np.nanmean(table[:, read] ** 2, axis=0))
+    return found
+
+
+def total_rms(table: np.ndarray) -> float:
+    """Root mean square of all that was measured."""
+    return float(np.sqrt(np.nanmean(table**2)))
+
+
+def gap_row(names: Sequence[str], table: np.ndarray) -> dict[str, float | None]:
+    """Gaps by channel, and total, of a table (runs, outputs)."""
+    by = [float(one) if np.isfinite(one) else None for one in channel_rms(table)]
+    return {**dict(zip(names, by, strict=True)), "total": total_rms(table)}
+
+
 def measure(vehicle: LoadedVehicle, runs: Sequence[OwnRun]) -> dict[str, Any]:
     """Gaps in tolerances: per run, over all, and the share of the squared gap of each channel."""
     observer = observer_of(vehicle, runs, every_row=True)
@@ -22,14 +40,14 @@ def measure(vehicle: LoadedVehicle, runs: Sequence[OwnRun]) -> dict[str, Any]:
     def row(values: np.ndarray) -> dict[str, float]:
         return {name: float(value) for name, value in zip(names, values, strict=True) if np.isfinite(value)}
 
-    every = np.sqrt(np.nanmean(table**2, axis=0)) if len(table) else table
+    every = channel_rms(table)
     seen = np.isfinite(every)
     shares = every[seen] ** 2 / max(float((every[seen] ** 2).sum()), 1e-300)
     return {
         "format": 1, "vehicle": vehicle.name, "horizon_s": observer.horizon,
-        "runs": [{"run": run.name, "channels": row(values), "total": float(np.sqrt(np.nanmean(values**2)))}
+        "runs": [{"run": run.name, "channels": row(values), "total": total_rms(values)}
                  for run, values in zip(runs, table, strict=True)],
-        "channels": row(every), "total": float(np.sqrt(np.nanmean(table**2))),
+        "channels": row(every), "total": total_rms(table),
         "where": [{"subsystem": "output", "element": name, "share": float(share)}
                   for name, share in zip(np.array(names)[seen], shares, strict=True)],
         "tolerances": row(observer.tolerances), "notes": list(observer.notes),

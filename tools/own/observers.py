@@ -12,6 +12,7 @@ from glider.tools.own.operating_points import with_operating_points
 from glider.tools.own.runs import OwnRun
 
 LEAST_STEP = 0.1  # s between rows
+ROUNDING = 0.01  # of that, in the times of rows
 
 
 def observer_of(vehicle: LoadedVehicle, runs: Sequence[OwnRun], every_row: bool = False) -> Observer:
@@ -22,6 +23,22 @@ def observer_of(vehicle: LoadedVehicle, runs: Sequence[OwnRun], every_row: bool 
 
 
 def thinned(run: OwnRun) -> OwnRun:
-    """Every so many-th row of a run that was logged faster than its motion needs."""
-    step = max(1, round(LEAST_STEP / max(float(np.median(np.diff(run.t))), 1e-9)))
-    return run if step == 1 else replace(run, t=run.t[::step], inputs=run.inputs[::step], outputs=run.outputs[::step])
+    """A run that was logged faster than its motion needs: of every output a reading each LEAST_STEP, where it was read.
+
+    Of rows so close together those are kept that have most outputs, until every output that was read is there: sensors
+    that report on rows of their own all stay, at their times.
+    """
+    interval = max(float(np.median(np.diff(run.t))), 1e-9)
+    step = max(1, round(LEAST_STEP / interval))
+    if step == 1:
+        return run
+    together = np.floor((run.t - run.t[0]) / (step * interval) + ROUNDING).astype(int)
+    read, kept = np.isfinite(run.outputs), list[int]()
+    for rows in np.split(np.arange(len(run.t)), np.flatnonzero(np.diff(together)) + 1):
+        missing, chosen = read[rows].any(axis=0), list[int]()
+        while missing.any():
+            best = int(rows[np.argmax((read[rows] & missing).sum(axis=1))])
+            chosen.append(best)
+            missing = missing & ~read[best]
+        kept += sorted(chosen) or [int(rows[0])]
+    return replace(run, t=run.t[kept], inputs=run.inputs[kept], outputs=run.outputs[kept])
