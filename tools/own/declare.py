@@ -122,6 +122,7 @@ class Declaration:
     usual_inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     form: Mapping[tuple[str, str], float] = field(default_factory=dict)
     input_shares: Mapping[str, float] = field(default_factory=dict)  # in such points, of inputs under one command
+    effects: Mapping[str, float] = field(default_factory=dict)  # labels that the vehicle itself has, in their units
     operating_points: tuple[tuple[float, ...], ...] = ()  # mean inputs of runs, where forces are known of their own
 
     def index(self, what: str, name: str) -> int:

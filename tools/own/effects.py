@@ -5,11 +5,11 @@ does to the recorded windows is what its prior is about, posterior.py).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.own.declare import RUN, Declaration, Input
+from glider.tools.own.declare import DERIVED, RUN, Declaration, Input
 from glider.tools.own.operating_points import point_weights
 from glider.tools.own.runs import OwnRun
 
@@ -95,6 +95,13 @@ def nominal_point(declared: Declaration) -> ModelPoint:
             operating[declared.index("noises", noise), int(name)] = value
         else:
             form[declared.index("noises", noise), declared.index("inputs", name)] = value
+    driven: dict[int, dict[str, float]] = {}
+    for label, value in declared.effects.items():
+        family, name, kind = labels_of(declared)[label]
+        if family == OUTPUT:
+            reading[READ_ROWS.index(kind), declared.index("outputs", name)] += value
+        else:
+            driven.setdefault(declared.index("inputs", name), {})[kind] = value
     return ModelPoint(
         np.array([one.value for one in declared.parameters]),
         reading,
@@ -109,7 +116,15 @@ def nominal_point(declared: Declaration) -> ModelPoint:
             [(n, one.uncertainty, OWN_STEP * one.uncertainty) for n, one in enumerate(declared.parameters)
              if one.scope == RUN and one.uncertainty > 0.0]
         ).reshape(-1, 3).T.copy(),
+        driven,
     )  # fmt: skip
+
+
+def labels_of(declared: Declaration) -> dict[str, tuple[str, str, str]]:
+    """Family, name and kind of every label of inputs and outputs."""
+    lists = (INPUT, declared.inputs, DERIVED["inputs"]), (OUTPUT, declared.outputs, DERIVED["outputs"])
+    return {f"{one.name}_{kind}": (family, one.name, kind)
+            for family, every, kinds in lists for one in every for kind in kinds}  # fmt: skip
 
 
 def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], values: np.ndarray) -> ModelPoint:
@@ -140,7 +155,10 @@ def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], v
 
 
 def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: np.ndarray) -> list[Effect]:
-    """Every label of a declared vehicle, its spreads by how the runs move (an input that never moves has no lag)."""
+    """Every label of a declared vehicle, its spreads by how the runs move (an input that never moves has no lag).
+
+    What the vehicle itself has of one is where it begins.
+    """
     found: list[Effect] = []
     every = np.concatenate([run.inputs for run in runs]) if declared.inputs else np.zeros((1, 0))
     for n, one in enumerate(declared.inputs):
@@ -157,6 +175,9 @@ def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: 
             row("drift", f"{output.unit}/s", float(tolerance) / duration), row("lag", "s", SECONDS_SPREAD, 0.0),
             row("delay", "s", SECONDS_SPREAD, 0.0),
         ]  # fmt: skip
+    for n, effect in enumerate(found):
+        begins = declared.effects.get(effect.label, 0.0) / effect.spread
+        found[n] = replace(effect, low=effect.low - begins, high=effect.high - begins)
     for parameter in declared.parameters:
         spread = parameter.uncertainty or UNKNOWN_SHARE * abs(parameter.value) or 1.0
         low, high = ((limit - parameter.value) / spread for limit in (parameter.low, parameter.high))
@@ -256,7 +277,7 @@ def _of_input(one: Input, values: np.ndarray, moves: bool) -> list[Effect]:
             for kind, unit, spread in (*seconds, *ranges)
         ]
         # of how long a full stroke takes: 0 is at once
-        rows.append(Effect(f"{one.name}_rate_limit", INPUT, one.name, "stroke", "s", 1.0, 0.0, LONGEST))
+        rows.append(Effect(f"{one.name}_rate_limit", INPUT, one.name, "rate_limit", "s", 1.0, 0.0, LONGEST))
     return rows
 
 
@@ -276,8 +297,8 @@ def _driven(t: np.ndarray, u: np.ndarray, wrong: dict[str, float], interpolated:
     if wrong.get("delay", 0.0) > 0.0:
         # held inputs: what was in force then; between rows shares of both, so that it is smooth in the delay
         u = np.interp(t - wrong["delay"], t, u)
-    if wrong.get("stroke", 0.0) > 0.0:
-        u = _rate_limited(t, u, travel / wrong["stroke"])
+    if wrong.get("rate_limit", 0.0) > 0.0:
+        u = _rate_limited(t, u, travel / wrong["rate_limit"])
     if wrong.get("limit", 0.0) > 0.0:
         cut = wrong["limit"]
         middle = 0.5 * (u.max() + u.min())

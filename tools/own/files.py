@@ -10,7 +10,7 @@ import numpy as np
 
 from glider.hal.strict import ConfigError, Table, decode, locate
 from glider.tools.own.declare import Declaration, Parameter
-from glider.tools.own.effects import form_errors
+from glider.tools.own.effects import form_errors, labels_of
 
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -78,6 +78,9 @@ class IdentifiedTable(Table):
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
     # NOISE_by_INPUT: force a unit of the input; NOISE_at_POINT: force (operating_points.py)
+    effects: dict[str, float] = msgspec.field(
+        default_factory=dict
+    )  # labels that the vehicle itself has, in their units
     form: dict[str, float] = msgspec.field(default_factory=dict)
     input_shares: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of the distance between points
     operating_points: list[list[float]] = msgspec.field(default_factory=list)  # usual deviations from the usual inputs
@@ -209,7 +212,10 @@ def _with_form(table: IdentifiedTable, declared: Declaration, source: str) -> De
     for name in table.form:
         if name not in pairs:
             raise ConfigError(source, f"no noise and input of the model: {name}", key="identified.form")
-    return replace(found, form={pairs[name]: value for name, value in table.form.items()})
+    for name in table.effects:
+        if name not in labels_of(declared):
+            raise ConfigError(source, f"no label of the model's inputs and outputs: {name}", key="identified.effects")
+    return replace(found, form={pairs[name]: value for name, value in table.form.items()}, effects=table.effects)
 
 
 def _check(one: Parameter, text: str, source: Path) -> None:
@@ -221,7 +227,7 @@ def _check(one: Parameter, text: str, source: Path) -> None:
 
 
 def _check_identified(table: IdentifiedTable, declared: Declaration, source: str) -> None:
-    names = {one.name for one in declared.parameters} | {one.label for one in form_errors(declared)}
+    names = {one.name for one in declared.parameters} | {one.label for one in form_errors(declared)} | {*table.effects}
     for name in table.parameters:
         if name not in names:
             raise ConfigError(source, f"the model declares no parameter {name}", key="identified.parameters")

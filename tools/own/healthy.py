@@ -37,11 +37,12 @@ def healthy_of(observer: Observer) -> Healthy:
         scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
         session = np.sqrt(USUAL_SESSION_SHARE) * scatter
         return Healthy(effects, V, scatter, session, np.zeros(k), errors, 1.0, 1, HEALTHY.run_scale)
-    places = [names.index(name) for name in table.parameters]
-    spreads = np.array([effects[k].spread for k in places])
-    V[np.ix_(places, places)] = np.array(table.covariance).reshape(len(places), len(places)) / np.outer(
-        spreads, spreads
-    )
+    # an effect that the vehicle has of an input that never moves here is none of these runs
+    known = [n for n, name in enumerate(table.parameters) if name in names]
+    places = [names.index(table.parameters[n]) for n in known]
+    spreads, count = np.array([effects[k].spread for k in places]), len(table.parameters)
+    covariance = np.array(table.covariance).reshape(count, count)[np.ix_(known, known)]
+    V[np.ix_(places, places)] = covariance / np.outer(spreads, spreads)
     for n, effect in enumerate(effects):  # of other operating points than identified ones, how large such forces are
         if effect.at_point is not None and effect.at_point >= len(table.operating_points):
             V[n, n] = (table.operating_scatter.get(effect.name, 0.0) / effect.spread) ** 2

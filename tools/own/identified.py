@@ -60,7 +60,7 @@ def tables(found: Identified) -> dict[str, Any]:
     labels = {one.label: float(s * one.spread) for one, s in zip(found.labels, found.label_scatter, strict=True)}
     parameters = given.setdefault("parameters", {})
     sensors = given.setdefault("sensors", {})
-    names, places, form = [], [], {}
+    names, places, form, effects = [], [], {}, dict(declared.effects)
     for k, one in enumerate(found.nuisance):
         move, error = float(values[k] * one.spread), float(sd[k] * one.spread)
         if one.family == "parameter":
@@ -75,6 +75,10 @@ def tables(found: Identified) -> dict[str, Any]:
             places.append(k)
         elif one.family == FORM:
             form[one.label] = declared.form.get((one.name, one.kind), 0.0) + move
+            names.append(one.label)
+            places.append(k)
+        elif one.label in found.effects:
+            effects[one.label] = effects.get(one.label, 0.0) + move
             names.append(one.label)
             places.append(k)
         elif one.family != PUSH:
@@ -95,7 +99,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "level_scatter": found.level_scatter,
         "scatter": {name: value for name, value in scatter.items() if value > 0.0},
         "session_scatter": {name: value for name, value in session.items() if value > 0.0}, "label_scatter": labels,
-        "noise_gain": found.noise_gain, "form": form,
+        "noise_gain": found.noise_gain, "form": form, "effects": effects,
         "input_shares": dict(declared.input_shares),
         "operating_points": [list(one) for one in declared.operating_points],
         "operating_scatter": _operating(found),
@@ -117,7 +121,7 @@ def plain(found: Identified) -> dict[str, Any]:
     for k, one in enumerate(found.nuisance):
         if one.at_point is not None:  # none of these means anything alone
             continue
-        start = 0.0
+        start = found.vehicle.declared.effects.get(one.label, 0.0)
         if one.family == "parameter":
             start = found.vehicle.declared.parameters[found.vehicle.declared.index("parameters", one.name)].value
         mean, error = start + float(found.values[k] * one.spread), float(sd[k] * one.spread)

@@ -48,6 +48,7 @@ from glider.tools.own.runs_fit import (
     left_by,
     level_scatter,
 )
+from glider.tools.own.usual_effects import with_usual_effects
 
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
 USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads
@@ -78,6 +79,7 @@ class Identified:
     session_scatter: np.ndarray  # (nuisance,) spreads, from session to session beside that
     operating_scatter: dict[str, float]  # by noise, spreads: 1 sigma of what goes with operating points
     noise_gain: dict[str, float]  # nat a window that excess noise gains in healthy runs, by label
+    effects: list[str] = field(default_factory=list)  # labels among the nuisance that all runs show
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -148,14 +150,16 @@ def identify(
     fit = fit.led_at_levels(say)
     fit_levels(observer, [moved(declared, observer.point, nuisance, row) for row in fit.own],
                fit.errors.scales, say)  # fmt: skip
-    fit = fit.led_with_differences(say)
+    fit, added = with_usual_effects(fit.led_with_differences(say), FILE_PRIOR, say)
+    nuisance, limits = fit.nuisance, fit.limits
+    vehicles = np.append(vehicles, np.ones(len(added), dtype=bool))
     fit, components, notes = with_components(fit, vehicles, say)
     values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
     fit.errors = left_by(fit.expansions(), fit.errors)
     errors, found = fit.errors, fit.expansions(keep=True)
     *_, eta = inflation(found)
     if count < MIN_SCATTER_RUNS:
-        scatter = usual
+        scatter = fit.usual
     else:
         scores = [channel_scores(observer, n, nuisance, one, errors).tempered(eta) for n, one in enumerate(found)]
         times = persistence(scores, V, scatter, vehicles)
@@ -168,7 +172,7 @@ def identify(
     scatter, session_scatter = learn_sessions(tempered, V, scatter, counts)
     warm = [marginalised(one, scatter) for one in tempered]
     each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
-    apart = session_scatter if len(counts) > 1 else np.zeros(k)
+    apart = session_scatter if len(counts) > 1 else np.zeros_like(scatter)
     every, others = Pooled.of(warm, V), left_out(warm, V)
     between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
@@ -182,7 +186,7 @@ def identify(
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, between,
                       errors, components, own, before, after, level_scatter(found), len(sessions), session_scatter,
-                      operating_scatter, noise_gain, notes)  # fmt: skip
+                      operating_scatter, noise_gain, [one.label for one in added], notes)  # fmt: skip
 
 
 def with_components(

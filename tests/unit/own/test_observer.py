@@ -110,7 +110,7 @@ def test_every_standard_effect_moves_what_it_is_of_and_nothing_at_no_size(linear
     assert {"push_gain", "push_rate_limit", "place_bias", "place_delay", "damping", "mass"} <= {
         one.label for one in effects
     }
-    kinds = {"inputs": {one.kind for one in effects if one.family == "input"} - {"stroke"} | {"rate_limit"},
+    kinds = {"inputs": {one.kind for one in effects if one.family == "input"},
              "outputs": {one.kind for one in effects if one.family == "output"},
              "noises": {one.kind for one in noise_effects(vehicle.declared)}}  # fmt: skip
     assert {what: set(names) for what, names in DERIVED.items()} == kinds
