@@ -117,6 +117,19 @@ def test_a_gyro_that_reads_too_much_is_its_gain(pool):
     assert first["label"] == "r_gain"
     assert answer["selected"] == ["r_gain"]
     assert first["parameters"]["r_gain"]["estimate"] == pytest.approx(0.2, abs=0.05)
+    measured = glider("gap", "measure", "gyro", "--vehicle", "gyro-said/corrected.toml", "--json", cwd=folder)
+    assert json.loads(measured.stdout)["channels"]["r"] == pytest.approx(answer["gap"]["after"]["r"], rel=0.1)
+    assert answer["gap"]["after"]["r"] < 0.5 * answer["gap"]["before"]["r"]
+
+
+def test_a_label_in_the_vehicle_file_that_the_model_has_not_is_one_line(pool):
+    folder, case, _ = pool
+    case("named", 8, runs=2)
+    text = (folder / "identified" / "identified.toml").read_text() + "\n[effects]\nr_gin = 0.1\n"
+    (folder / "identified" / "named.toml").write_text(text)
+    done = glider("gap", "measure", "named", "--vehicle", "identified/named.toml", cwd=folder)
+    assert done.returncode == 2
+    assert f"named.toml:{len(text.splitlines())}: effects.r_gin: no label" in done.stderr
 
 
 def test_a_force_that_grows_in_every_run_is_unknown(pool):
@@ -141,6 +154,9 @@ def test_runs_without_a_case_file_are_a_case_where_their_vehicle_is_named(pool):
     assert "case.toml" in unnamed.stderr
     for run in (folder / "logs").iterdir():
         run.unlink()
+    absent = glider("gap", "measure", "logs", "--vehicle", "yours.toml", cwd=folder)
+    assert absent.returncode == 2
+    assert "no vehicle 'yours.toml'" in absent.stderr
     empty = glider(*command, cwd=folder)
     assert empty.returncode == 2
     assert "neither case.toml nor run*.csv" in empty.stderr

@@ -54,8 +54,13 @@ def load_vehicle(wanted: str, base: Path | None = None) -> Vehicle:
 
 def load_any_vehicle(wanted: str, base: Path | None = None) -> Any:
     """A vehicle of any kind, as load_vehicle."""
-    text, source = name_or_path(wanted, "vehicle", "model/vehicles", base, shipped_vehicles())
+    text, source = vehicle_text(wanted, base)
     return kind_of_file(text, source).decode(text, source)
+
+
+def vehicle_text(wanted: str, base: Path | None = None) -> tuple[str, str]:
+    """Text and source of a vehicle, as load_vehicle."""
+    return name_or_path(wanted, "vehicle", "model/vehicles", base, shipped_vehicles())
 
 
 def load_mission(wanted: str) -> tuple[str, str, Mission]:

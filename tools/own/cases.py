@@ -5,7 +5,7 @@ from pathlib import Path
 
 from glider.tools.data.importers.mapping import RUN_DATA, Target
 from glider.tools.data.runs.case import CASE_FILE
-from glider.tools.data.sources import read_text
+from glider.tools.data.sources import read_text, vehicle_text
 from glider.tools.own.check import load_own
 from glider.tools.own.files import is_own
 from glider.tools.own.load import LoadedVehicle, read_own
@@ -18,8 +18,8 @@ def own_vehicle(case: Path, wanted: str | None) -> LoadedVehicle | None:
     InputError or ConfigError where it is one and cannot be used.
     """
     if wanted is not None:
-        path = Path(wanted)
-        return load_own(path) if path.is_file() and is_own(read_text(path)) else None
+        text, source = vehicle_text(wanted)
+        return load_own(Path(source)) if is_own(text) else None
     folder = case if case.is_dir() else case.parent
     if not (folder / CASE_FILE).is_file():
         return None

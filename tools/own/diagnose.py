@@ -10,7 +10,7 @@ import numpy as np
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.own.decision import NONE, UNKNOWN, Healthy, Hypothesis, Posterior, confounded, group_of
-from glider.tools.own.effects import NOISE, UNEXPLAINED, ModelPoint
+from glider.tools.own.effects import NOISE, READ_ROWS, UNEXPLAINED, ModelPoint, effects_of
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
@@ -161,15 +161,13 @@ def _numbers(observer: Observer, point: ModelPoint) -> dict[str, Any]:
     """The corrected vehicle as numbers: parameters, what sensors read wrongly, what inputs do wrongly."""
     declared, base = observer.declared, observer.point
     theta = {one.name: float(value) for one, value in zip(declared.parameters, point.theta, strict=True)}
-    rows = ("gain", "bias", "drift", "lag", "delay")
     sensors = {
-        one.name: {
-            name: float(point.reading[k, n]) for k, name in enumerate(rows) if point.reading[k, n] != base.reading[k, n]
-        }
-        for n, one in enumerate(declared.outputs)
+        one.name: {kind: float(value) for kind, value, known in zip(READ_ROWS, *rows, strict=True) if value != known}
+        for one, *rows in zip(declared.outputs, point.reading.T, base.reading.T, strict=True)
     }
     inputs = {declared.inputs[n].name: wrong for n, wrong in point.driven.items()}
-    return {"parameters": theta, "sensors": {name: one for name, one in sensors.items() if one}, "inputs": inputs}
+    return {"parameters": theta, "sensors": {name: one for name, one in sensors.items() if one}, "inputs": inputs,
+            "effects": effects_of(declared, point)}  # fmt: skip
 
 
 def write(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: str, out: Path) -> dict[str, Any]:
@@ -180,12 +178,9 @@ def write(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
     given = tomllib.loads(vehicle.text)
     for name, value in answer["corrected"]["parameters"].items():
         given.setdefault("parameters", {}).setdefault(name, {})["value"] = value
-    wrong = {"sensors": answer["corrected"]["sensors"], "inputs": answer["corrected"]["inputs"]}
-    given["corrections"] = {kind: one for kind, one in wrong.items() if one}
+    given["effects"] = answer["corrected"]["effects"]
     files, given = moved_to(out, vehicle, given)
     files[out / ANSWER] = (json.dumps(as_plain(answer), indent=1) + "\n").encode("utf-8")
-    if not given["corrections"]:
-        del given["corrections"]
     files[out / CORRECTED] = toml_text(given).encode("utf-8")
     write_with_folders(files)
     return answer

@@ -127,6 +127,17 @@ def labels_of(declared: Declaration) -> dict[str, tuple[str, str, str]]:
             for family, every, kinds in lists for one in every for kind in kinds}  # fmt: skip
 
 
+def effects_of(declared: Declaration, point: ModelPoint) -> dict[str, float]:
+    """Labels of inputs and outputs that a model has, in their units: what `nominal_point` would make it of."""
+    none = nominal_point(replace(declared, effects={}))
+    read = {(OUTPUT, one.name, kind): point.reading[row, n] - none.reading[row, n]
+            for n, one in enumerate(declared.outputs) for row, kind in enumerate(READ_ROWS)}  # fmt: skip
+    driven = {(INPUT, declared.inputs[n].name, kind): value
+              for n, wrong in point.driven.items() for kind, value in wrong.items()}  # fmt: skip
+    sizes = read | driven
+    return {label: float(sizes[of]) for label, of in labels_of(declared).items() if sizes.get(of, 0.0) != 0.0}
+
+
 def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], values: np.ndarray) -> ModelPoint:
     """A point with effects of sizes `values` (effects,) in spreads."""
     found = point.copy()

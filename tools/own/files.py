@@ -78,9 +78,6 @@ class IdentifiedTable(Table):
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
     # NOISE_by_INPUT: force a unit of the input; NOISE_at_POINT: force (operating_points.py)
-    effects: dict[str, float] = msgspec.field(
-        default_factory=dict
-    )  # labels that the vehicle itself has, in their units
     form: dict[str, float] = msgspec.field(default_factory=dict)
     input_shares: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of the distance between points
     operating_points: list[list[float]] = msgspec.field(default_factory=list)  # usual deviations from the usual inputs
@@ -111,6 +108,7 @@ class OwnVehicle(Table):
     inputs: dict[str, InputTable] = msgspec.field(default_factory=dict)
     noise: dict[str, NoiseTable] = msgspec.field(default_factory=dict)
     start: dict[str, StartTable] = msgspec.field(default_factory=dict)
+    effects: dict[str, float] = msgspec.field(default_factory=dict)  # labels of inputs and outputs, SI
     windows: WindowsTable | None = None
     identified: IdentifiedTable | None = None
 
@@ -190,7 +188,13 @@ def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: P
             raise ConfigError(str(source), "no output or state of the model", key=f"start.{name}",
                               line=locate(text, ["start", name]))  # fmt: skip
     horizon = declared.horizon if given.windows is None else given.windows.seconds
-    found = replace(declared, **lists, states=tuple(states.values()), horizon=horizon, start=start)
+    found = replace(
+        declared, **lists, states=tuple(states.values()), horizon=horizon, start=start, effects=given.effects
+    )
+    for name in given.effects:
+        if name not in labels_of(found):
+            raise ConfigError(str(source), "no label of the model's inputs and outputs", key=f"effects.{name}",
+                              line=locate(text, ["effects", name]))  # fmt: skip
     if given.identified is not None:
         found = _with_form(given.identified, found, str(source))
         _check_identified(given.identified, found, str(source))
@@ -212,10 +216,7 @@ def _with_form(table: IdentifiedTable, declared: Declaration, source: str) -> De
     for name in table.form:
         if name not in pairs:
             raise ConfigError(source, f"no noise and input of the model: {name}", key="identified.form")
-    for name in table.effects:
-        if name not in labels_of(declared):
-            raise ConfigError(source, f"no label of the model's inputs and outputs: {name}", key="identified.effects")
-    return replace(found, form={pairs[name]: value for name, value in table.form.items()}, effects=table.effects)
+    return replace(found, form={pairs[name]: value for name, value in table.form.items()})
 
 
 def _check(one: Parameter, text: str, source: Path) -> None:
@@ -227,7 +228,8 @@ def _check(one: Parameter, text: str, source: Path) -> None:
 
 
 def _check_identified(table: IdentifiedTable, declared: Declaration, source: str) -> None:
-    names = {one.name for one in declared.parameters} | {one.label for one in form_errors(declared)} | {*table.effects}
+    names = {one.name for one in declared.parameters} | {one.label for one in form_errors(declared)}
+    names |= set(declared.effects)
     for name in table.parameters:
         if name not in names:
             raise ConfigError(source, f"the model declares no parameter {name}", key="identified.parameters")

@@ -90,6 +90,7 @@ def tables(found: Identified) -> dict[str, Any]:
         table["tolerance"] = float(observer.tolerances[n])
     given["noise"] = {one.name: {"density": float(observer.point.density[n])} for n, one in enumerate(declared.noises)}
     given["windows"] = {"seconds": observer.horizon}
+    given["effects"] = effects
     units = np.array([found.nuisance[k].spread for k in places])
     covariance = errors[np.ix_(places, places)] * np.outer(units, units)
     given["identified"] = {
@@ -99,7 +100,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "level_scatter": found.level_scatter,
         "scatter": {name: value for name, value in scatter.items() if value > 0.0},
         "session_scatter": {name: value for name, value in session.items() if value > 0.0}, "label_scatter": labels,
-        "noise_gain": found.noise_gain, "form": form, "effects": effects,
+        "noise_gain": found.noise_gain, "form": form,
         "input_shares": dict(declared.input_shares),
         "operating_points": [list(one) for one in declared.operating_points],
         "operating_scatter": _operating(found),

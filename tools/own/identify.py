@@ -46,6 +46,7 @@ from glider.tools.own.runs_fit import (
     USUAL_SCATTER,
     RunsFit,
     left_by,
+    left_out,
     level_scatter,
 )
 from glider.tools.own.usual_effects import with_usual_effects
@@ -151,9 +152,12 @@ def identify(
     fit_levels(observer, [moved(declared, observer.point, nuisance, row) for row in fit.own],
                fit.errors.scales, say)  # fmt: skip
     fit, added = with_usual_effects(fit.led_with_differences(say), FILE_PRIOR, say)
-    nuisance, limits = fit.nuisance, fit.limits
+    nuisance = fit.nuisance
     vehicles = np.append(vehicles, np.ones(len(added), dtype=bool))
     fit, components, notes = with_components(fit, vehicles, say)
+    notes += [
+        f"all runs show {one.label}, which the model does not have: the vehicle has it ([effects])" for one in added
+    ]
     values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
     fit.errors = left_by(fit.expansions(), fit.errors)
     errors, found = fit.errors, fit.expansions(keep=True)
@@ -178,8 +182,7 @@ def identify(
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
-    # to first order in what leaving a run out moves
-    after = _held_out(observer, nuisance, [values + one.mean() - every.mean() for one in others], limits)
+    after = fit.held_out(every, others)
     labels, label_scatter = _label_scatter(observer, nuisance, own, others, scatter, eta, errors)
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon, errors)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
@@ -212,11 +215,6 @@ def with_components(
     notes = [f"errors of windows are what the model's noises make: probability {chance:.2f}"]
     say(notes[0])
     return (tried.led_with_differences(say), learned, notes) if chance > 0.5 else (fit, None, notes)
-
-
-def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:
-    """What the other runs say, of each run; a single one's others are itself."""
-    return [Pooled.of([*found[:n], *found[n + 1 :]] or found, V) for n in range(len(found))]
 
 
 def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> float:
@@ -293,9 +291,3 @@ def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
         place = labels.index(one.label)
         found[place, k] = one.spread / effects[place].spread
     return found
-
-
-def _held_out(observer, nuisance, values, limits) -> np.ndarray:
-    """Gaps (runs, outputs) of every run by a model of the others, whose values (runs, nuisance) are."""
-    points = [moved(observer.declared, observer.point, nuisance, np.clip(one, *limits)) for one in values]
-    return np.array([observer.gaps(n, point, observer.horizon) for n, point in enumerate(points)])

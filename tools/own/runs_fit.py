@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glider.tools.inference.pooled import Pooled, learn_scatter, log_prior, marginalised, run_values
+from glider.tools.inference.pooled import Parabola, Pooled, learn_scatter, log_prior, marginalised, run_values
 from glider.tools.own.effects import Effect, moved
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, inflation
 from glider.tools.own.observer import Observer
@@ -84,6 +84,15 @@ class RunsFit:
         level = RunLevel(self.errors, float(inflation(weighted)[-1]), scatter)
         return weighted, [level.of(one.tempered(level.eta)) for one in found], level
 
+    def held_out(self, every: Pooled, others: Sequence[Pooled]) -> np.ndarray:
+        """Gaps (runs, outputs), in tolerances, of every run by a model of the others (`left_out`), to first order."""
+        observer, found = self.observer, list[np.ndarray]()
+        for n, one in enumerate(others):
+            values = np.clip(self.values + one.mean() - every.mean(), *self.limits)
+            point = moved(observer.declared, observer.point, self.nuisance, values)
+            found.append(observer.gaps(n, point, observer.horizon))
+        return np.array(found)
+
     def stepped(
         self, warm: Sequence[Expansion], found: Sequence[Expansion], level: RunLevel, say: Callable[[str], None]
     ) -> bool:
@@ -138,6 +147,11 @@ def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequen
 
             V = at(max(SCATTERS, key=score))
     return V
+
+
+def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:
+    """What the other runs say, of each run; a single one's others are itself."""
+    return [Pooled.of([*found[:n], *found[n + 1 :]] or found, V) for n in range(len(found))]
 
 
 def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:

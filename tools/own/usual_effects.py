@@ -10,29 +10,46 @@ from dataclasses import replace
 
 import numpy as np
 
-from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Pooled, marginalised
-from glider.tools.own.decision import log_odds
+from glider.tools.own.decision import ANOTHER, log_odds
 from glider.tools.own.effects import PARAMETER, Effect, standard_effects
 from glider.tools.own.hierarchy import LEAST_REACH, RunLevel, expand, inflation
 from glider.tools.own.posterior import MOST_EFFECTS, alone, size_evidence
-from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, RunsFit
+from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, RunsFit, left_out
 
 MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and how long, before one is chosen
 
 
 def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -> tuple[RunsFit, list[Effect]]:
-    """The fit with labels that all runs show among what they share, and these; prior: 1 sigma of each, spreads."""
-    added: list[Effect] = []
-    while len(added) < MOST_EFFECTS and len(fit.own) >= MIN_SCATTER_RUNS:
+    """The fit with labels that all runs show among what they share, and these; prior: 1 sigma of each, spreads.
+
+    A label stays if runs left out are predicted better with it, each by the logarithm of its errors.
+    """
+    added, scales = list[Effect](), fit.errors.scales
+    left = _left(fit, scales) if len(fit.own) >= MIN_SCATTER_RUNS else -np.inf
+    while np.isfinite(left) and len(added) < MOST_EFFECTS:
         labels, eta = _evident(fit)
         if not labels:
             break
-        _, fit, effect = max((_tried(fit, one, prior, eta) for one in labels), key=lambda one: one[0])
-        say(f"all runs show {effect.label}")
-        fit = fit.led_with_differences(say)
+        _, led, effect = max((_tried(fit, one, prior, eta) for one in labels), key=lambda one: one[0])
+        led = led.led_with_differences(say)
+        before, left = left, _left(led, scales)
+        times = np.exp(0.5 * (left - before))
+        say(f"all runs show {effect.label}: with it the errors of runs left out are {times:.2f} times as large")
+        if left >= before:
+            break
+        fit = led
         added.append(effect)
     return fit, added
+
+
+def _left(fit: RunsFit, scales: np.ndarray) -> float:
+    """Logarithm of the mean square of runs left out, mean over runs; scales (outputs,) in which errors are counted."""
+    found = fit.expansions()
+    eta = float(inflation(found)[-1])
+    warm = [marginalised(one.tempered(eta), fit.scatter) for one in found]
+    gaps = fit.held_out(Pooled.of(warm, fit.V), left_out(warm, fit.V)) / scales
+    return float(np.mean(np.log(np.nanmean(gaps**2, axis=1))))
 
 
 def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float) -> tuple[float, RunsFit, Effect]:
@@ -86,6 +103,6 @@ def _evident(fit: RunsFit) -> tuple[list[Effect], float]:
     nat = size_evidence(slope / times, precision / times, np.maximum(reach, LEAST_REACH),
                         np.array([one.one_sided for one in labels]))  # fmt: skip
     nat += np.array([log_odds(one) for one in labels]) - np.log(len(every))
-    nat += np.log(HEALTHY.changed) - np.log1p(-HEALTHY.changed)
+    nat += np.log(ANOTHER)
     nat[reach <= LEAST_REACH] = -np.inf
     return [labels[k] for k in np.argsort(-nat)[:MOST_TRIED] if nat[k] > 0.0], eta
