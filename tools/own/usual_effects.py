@@ -1,55 +1,63 @@
 """Effects that healthy runs show all alike: an identified vehicle has them, and what is asked later is asked beside it.
 
 A sensor that is late, or a motor that takes its time, where the model has neither, is no change: every run shows it.
-Such a label is one of the numbers that runs share, with the prior of a parameter. The most evident is added, as
-probable before as in a diagnosis, and all is fitted again, until none is probable.
+Such a label is one of the numbers that runs share, with the prior of a parameter. The most evident is added and all
+is fitted again, until none is probable.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from glider.tools.inference.pooled import Pooled, marginalised
-from glider.tools.own.decision import ANOTHER, log_odds
+from glider.tools.own.decision import log_odds
 from glider.tools.own.effects import PARAMETER, Effect, standard_effects
 from glider.tools.own.hierarchy import LEAST_REACH, RunLevel, expand, inflation
+from glider.tools.own.measure import total_rms
 from glider.tools.own.posterior import MOST_EFFECTS, alone, size_evidence
 from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, RunsFit, left_out
 
+LACKING = 0.0  # prior log odds that the model lacks a label that the vehicle has, and that it lacks a further one
 MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and how long, before one is chosen
 
 
 def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -> tuple[RunsFit, list[Effect]]:
     """The fit with labels that all runs show among what they share, and these; prior: 1 sigma of each, spreads.
 
-    A label stays if runs left out are predicted better with it, each by the logarithm of its errors.
+    One that is not probable any more beside later ones goes again. The search ends where runs left out are predicted
+    no better.
     """
-    added, scales = list[Effect](), fit.errors.scales
-    left = _left(fit, scales) if len(fit.own) >= MIN_SCATTER_RUNS else -np.inf
-    while np.isfinite(left) and len(added) < MOST_EFFECTS:
-        labels, eta = _evident(fit)
-        if not labels:
+    added, gone = list[Effect](), set[str]()
+    left = _left(fit) if len(fit.own) >= MIN_SCATTER_RUNS else 0.0
+    while left > 0.0:
+        odds, eta = _log_odds(fit, added)
+        weak = [one for one in added if odds[one] <= 0.0]
+        labels = [one for one in odds if odds[one] > 0.0 and one not in added and one.label not in gone]
+        if weak:
+            tried, new = _without(fit, weak[0]), [one for one in added if one is not weak[0]]
+            gone.add(weak[0].label)
+        elif labels and len(added) < MOST_EFFECTS:
+            likeliest = sorted(labels, key=lambda one: -odds[one])[:MOST_TRIED]
+            _, tried, effect = max((_tried(fit, one, prior, eta) for one in likeliest), key=lambda one: one[0])
+            new = [*added, effect]
+        else:
             break
-        _, led, effect = max((_tried(fit, one, prior, eta) for one in labels), key=lambda one: one[0])
-        led = led.led_with_differences(say)
-        before, left = left, _left(led, scales)
-        times = np.exp(0.5 * (left - before))
-        say(f"all runs show {effect.label}: with it the errors of runs left out are {times:.2f} times as large")
-        if left >= before:
+        tried = tried.led_with_differences(say)
+        there = _left(tried)
+        say(f"runs left out {left:.2f} -> {there:.2f} tolerances, if they have {', '.join(one.label for one in new)}")
+        if there >= left:
             break
-        fit = led
-        added.append(effect)
+        fit, added, left = tried, new, there
     return fit, added
 
 
-def _left(fit: RunsFit, scales: np.ndarray) -> float:
-    """Logarithm of the mean square of runs left out, mean over runs; scales (outputs,) in which errors are counted."""
+def _left(fit: RunsFit) -> float:
+    """Gap of runs left out, tolerances."""
     found = fit.expansions()
     eta = float(inflation(found)[-1])
     warm = [marginalised(one.tempered(eta), fit.scatter) for one in found]
-    gaps = fit.held_out(Pooled.of(warm, fit.V), left_out(warm, fit.V)) / scales
-    return float(np.mean(np.log(np.nanmean(gaps**2, axis=1))))
+    return total_rms(fit.held_out(Pooled.of(warm, fit.V), left_out(warm, fit.V)))
 
 
 def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float) -> tuple[float, RunsFit, Effect]:
@@ -75,8 +83,20 @@ def _beside(fit: RunsFit, effect: Effect, prior: float) -> RunsFit:
     )  # fmt: skip
 
 
-def _evident(fit: RunsFit) -> tuple[list[Effect], float]:
-    """Labels that are more probable than not by the parabola, all else integrated out, the likeliest, and inflation.
+def _without(fit: RunsFit, effect: Effect) -> RunsFit:
+    """The fit without a number that runs share."""
+    kept = np.array([one is not effect for one in fit.nuisance])
+    low, high = fit.limits
+    return replace(
+        fit, nuisance=[one for one in fit.nuisance if one is not effect], limits=(low[kept], high[kept]),
+        usual=fit.usual[kept], V=fit.V[np.ix_(kept, kept)], values=fit.values[kept], own=fit.own[:, kept],
+        scatter=fit.scatter[kept],
+    )  # fmt: skip
+
+
+def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float], float]:
+    """Log odds, by the parabola and all else integrated out, of labels that are not among what runs share and of those
+    that were added to it, and how many errors are the same one.
 
     A label's slope is the sum of what every run says: where runs differ in it by more than their likelihood has it, it
     counts for so much less (the sandwich variance).
@@ -84,25 +104,32 @@ def _evident(fit: RunsFit) -> tuple[list[Effect], float]:
     observer, known = fit.observer, {one.label for one in fit.nuisance}
     every = standard_effects(observer.declared, observer.runs, observer.tolerances)
     labels = [one for one in every if one.family != PARAMETER and one.label not in known]
-    first, count, runs = len(fit.nuisance), len(labels), len(fit.own)
-    effects, beside = [*fit.nuisance, *labels], np.zeros(count)
+    first, beside, runs = len(fit.nuisance), np.zeros(len(labels)), len(fit.own)
+    effects = [*fit.nuisance, *labels]
     found = [expand(observer, n, effects, np.append(row, beside), fit.errors, observer.horizon)
              for n, row in enumerate(fit.own)]  # fmt: skip
-    reach = np.sqrt(np.mean([one.reach for one in found], axis=0))[first:]
+    reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
     scatter, eta = np.append(fit.scatter, beside), float(inflation(found)[-1])
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
-    V = np.zeros((first + count, first + count))
-    V[:first, :first] = fit.V
-    pooled = Pooled.of(warm, V)
-    slope, precision = (one[first:] for one in alone(pooled))
-    mode, gain = pooled.mean(), pooled.H @ pooled.covariance()
-    scores = np.array([-one.offset - one.curvature @ mode for one in warm])
-    scores -= scores @ gain.T
-    varied = runs * scores.var(axis=0, ddof=1)[first:]
-    times = np.maximum(1.0, varied / np.maximum(precision, 1e-12))
-    nat = size_evidence(slope / times, precision / times, np.maximum(reach, LEAST_REACH),
-                        np.array([one.one_sided for one in labels]))  # fmt: skip
-    nat += np.array([log_odds(one) for one in labels]) - np.log(len(every))
-    nat += np.log(ANOTHER)
-    nat[reach <= LEAST_REACH] = -np.inf
-    return [labels[k] for k in np.argsort(-nat)[:MOST_TRIED] if nat[k] > 0.0], eta
+
+    def log_odds_of(places: np.ndarray) -> np.ndarray:
+        V = np.zeros((len(effects), len(effects)))
+        V[:first, :first] = fit.V
+        V[places], V[:, places] = 0.0, 0.0
+        pooled = Pooled.of(warm, V)
+        slope, precision = (one[places] for one in alone(pooled))
+        mode = pooled.mean()
+        scores = np.array([-one.offset - one.curvature @ mode for one in warm])
+        scores -= scores @ (pooled.H @ pooled.covariance()).T
+        varied = runs * scores.var(axis=0, ddof=1)[places]
+        times = np.maximum(1.0, varied / np.maximum(precision, 1e-12))
+        among = [effects[k] for k in places]
+        nat = size_evidence(slope / times, precision / times, np.maximum(reach[places], LEAST_REACH),
+                            np.array([one.one_sided for one in among]))  # fmt: skip
+        nat += np.array([log_odds(one) for one in among]) - np.log(len(every)) + LACKING
+        return np.where(reach[places] > LEAST_REACH, nat, -np.inf)
+
+    new = np.arange(first, len(effects))
+    odds = dict(zip(labels, log_odds_of(new), strict=True))
+    odds |= {one: float(log_odds_of(np.array([fit.nuisance.index(one)]))[0]) for one in added}
+    return odds, eta
