@@ -21,8 +21,9 @@ from glider.tools.own.decision import (
 )
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
+from glider.tools.own.identify import run_inflation
 from glider.tools.own.posterior import Engine, alone
-from glider.tools.own.runs_fit import left_out, run_inflation
+from glider.tools.own.runs_fit import left_out
 from glider.tools.own.watch import Event, Refit, Watch
 
 LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
