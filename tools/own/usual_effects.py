@@ -1,8 +1,8 @@
 """Effects that healthy runs show all alike: an identified vehicle has them, and what is asked later is asked beside it.
 
 A sensor that is late, or a motor that takes its time, where the model has neither, is no change: every run shows it.
-Such a label is one of the numbers that runs share, with the prior of a parameter. The most evident is added and all
-is fitted again, until none is probable.
+Such a label is one of the numbers that runs share, with the prior of a parameter. That the model lacks one, or
+a further one, is as probable as not before. The most evident is added and all is fitted again, until none is probable.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,6 @@ from glider.tools.own.measure import total_rms
 from glider.tools.own.posterior import MOST_EFFECTS, alone, size_evidence
 from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, RunsFit, left_out
 
-LACKING = 0.0  # prior log odds that the model lacks a label that the vehicle has, and that it lacks a further one
 MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and how long, before one is chosen
 
 
@@ -126,7 +125,7 @@ def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float
         among = [effects[k] for k in places]
         nat = size_evidence(slope / times, precision / times, np.maximum(reach[places], LEAST_REACH),
                             np.array([one.one_sided for one in among]))  # fmt: skip
-        nat += np.array([log_odds(one) for one in among]) - np.log(len(every)) + LACKING
+        nat += np.array([log_odds(one) for one in among]) - np.log(len(every))
         return np.where(reach[places] > LEAST_REACH, nat, -np.inf)
 
     new = np.arange(first, len(effects))

@@ -16,7 +16,7 @@ import numpy as np
 G = 9.81
 THRUST, SPEED = 4.0, 198.0 * 11.85  # N of each motor at a command of (us above 1000) times V: assumed
 ZERO, OFF, STARTS = 1000.0, 1140.0, 10.0  # us: no speed; the motors stand still below, +- half a width
-RIGHTING, METACENTRE = 0.4, 0.01  # N m/rad, m: assumed
+METACENTRE = 0.01  # m: assumed
 ARM, TORQUE, YAW_INERTIA = 0.15, 0.01, 0.05  # m, N m a N of thrust, kg m2: assumed
 BOTTOM, STIFFNESS, SOFT = 0.85, 100.0, 0.02  # m, N/m, m
 
@@ -64,6 +64,7 @@ parameters = {
     "yaw_start": {"unit": "rad/s", "value": -0.1, "uncertainty": 0.4},
     "yaw_inflow": {"unit": "rad/s", "value": -0.6, "uncertainty": 0.4},
     "yaw_wake": {"unit": "rad/s", "value": -0.6, "uncertainty": 0.4},
+    "righting": {"unit": "N m/rad", "value": 0.4, "uncertainty": 0.2, "low": 0.05},
 }
 noises = [
     ("heave_force", "m/s2", 0.02), ("roll_moment", "rad/s", 0.05), ("pitch_moment", "rad/s", 0.05),
@@ -106,8 +107,8 @@ def derivative(x, u, w, theta):
     out[1] = (thrust - buoyancy - bottom - theta[3] * heave - theta[4] * heave * abs(heave)) / theta[2] + w[0]
     out[6] = (running - v) / theta[12]
     out[7] = (v - g) / theta[13]
-    level_heel = share * staged(theta[18], theta[19], theta[20], v, g) + ARM * (f2 - f4) / RIGHTING
-    level_trim = share * staged(theta[21], theta[22], theta[23], v, g) - ARM * (f1 - f3) / RIGHTING
+    level_heel = share * staged(theta[18], theta[19], theta[20], v, g) + ARM * (f2 - f4) / theta[27]
+    level_trim = share * staged(theta[21], theta[22], theta[23], v, g) - ARM * (f1 - f3) / theta[27]
     out[8] = (level_heel - heel) / theta[14] + w[1]
     out[9] = (level_trim - trim) / theta[14] + w[2]
     out[10] = r
