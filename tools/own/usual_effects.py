@@ -44,7 +44,8 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
             break
         tried = tried.led_with_differences(say)
         there = _left(tried)
-        say(f"runs left out {left:.2f} -> {there:.2f} tolerances, if they have {', '.join(one.label for one in new)}")
+        have = ", ".join(one.label for one in new) or "none of these"
+        say(f"runs left out {left:.2f} -> {there:.2f} tolerances, if all runs have {have}")
         if there >= left:
             break
         fit, added, left = tried, new, there
