@@ -131,13 +131,15 @@ def plain(found: Identified) -> dict[str, Any]:
         rows.append({"name": one.label, "mean": mean, "sd": error, "ci90": ends, "unit": one.unit, "file": start,
                      "runs": runs})  # fmt: skip
     names = [one.name for one in found.vehicle.declared.outputs]
+    shown = [f"all runs show {label}, which the model does not have: [effects] of the vehicle has it"
+             for label in found.effects if found.better]  # fmt: skip
     return {
         "format": 1, "vehicle": found.vehicle.name, "parameters": rows, "groups": groups(found),
         "operating_points": {"count": len(found.vehicle.declared.operating_points), "scatter": _operating(found)},
         "gap": {"before": gap_row(names, found.before), "after": gap_row(names, found.after)},
         "horizon_s": found.observer.horizon,
         "handed_out": "identified" if found.better else "file",
-        "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes],
+        "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes, *shown],
     }  # fmt: skip
 
 

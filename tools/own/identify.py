@@ -155,9 +155,6 @@ def identify(
     nuisance = fit.nuisance
     vehicles = np.append(vehicles, np.ones(len(added), dtype=bool))
     fit, components, notes = with_components(fit, vehicles, say)
-    notes += [
-        f"all runs show {one.label}, which the model does not have: the vehicle has it ([effects])" for one in added
-    ]
     values, own, scatter, V = fit.values, fit.own, fit.scatter, fit.V
     fit.errors = left_by(fit.expansions(), fit.errors)
     errors, found = fit.errors, fit.expansions(keep=True)

@@ -1,8 +1,8 @@
 """Effects that healthy runs show all alike: an identified vehicle has them, and what is asked later is asked beside it.
 
 A sensor that is late, or a motor that takes its time, where the model has neither, is no change: every run shows it.
-Such a label is one of the numbers that runs share, with the prior of a parameter. That the model lacks one, or
-a further one, is as probable as not before. The most evident is added and all is fitted again, until none is probable.
+Such a label is one of the numbers that runs share, with the prior of a parameter. That the model lacks one, or a further
+one, is as probable as not before. The most evident is added and all is fitted again, until none is probable.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,8 +24,8 @@ MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and h
 def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -> tuple[RunsFit, list[Effect]]:
     """The fit with labels that all runs show among what they share, and these; prior: 1 sigma of each, spreads.
 
-    One that is not probable any more beside later ones goes again. The search ends where runs left out are predicted
-    no better.
+    One that is not probable any more beside later ones goes again. A step after which runs left out are predicted no
+    better is not taken, and is the last.
     """
     added, gone = list[Effect](), set[str]()
     left = _left(fit) if len(fit.own) >= MIN_SCATTER_RUNS else 0.0

@@ -5,7 +5,7 @@ import pytest
 
 from glider.tools.own.check import load_own
 from glider.tools.own.diagnose import diagnose_own
-from glider.tools.own.identified import write
+from glider.tools.own.identified import plain, write
 from glider.tools.own.identify import identify
 from glider.tools.own.runs import OwnRun
 from tests.support.own_vehicle import flown, module_of
@@ -63,6 +63,7 @@ def late(folder):
 
 def test_a_lag_of_every_run_is_the_vehicles_own_and_its_numbers_are_right(late):
     found, said = late
+    assert any("motor_lag" in note for note in plain(found)["notes"])
     assert found.effects == ["motor_lag"], said
     by = {one.label: one.spread * value for one, value in zip(found.nuisance, found.values, strict=True)}
     assert by["motor_lag"] == pytest.approx(LAG, abs=0.1)
