@@ -1,8 +1,8 @@
 """Effects that healthy runs show all alike: an identified vehicle has them, and what is asked later is asked beside it.
 
 A sensor that is late, or a motor that takes its time, where the model has neither, is no change: every run shows it.
-Such a label is one of the numbers that runs share, with the prior of a parameter. That the model lacks one, or a further
-one, is as probable as not before. The most evident is added and all is fitted again, until none is probable.
+Such a label is one of the numbers that runs share, with the prior of a parameter. That the model lacks one, or a
+further one, is as probable as not before. The most evident is added and all is fitted again, until none is probable.
 """
 
 from collections.abc import Callable, Sequence
