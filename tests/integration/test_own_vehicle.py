@@ -26,7 +26,7 @@ def inputs(random, t):
 def pool(tmp_path_factory):
     """A skeleton, cases flown by its model with other numbers, and the vehicle identified from the healthy ones."""
     folder = tmp_path_factory.mktemp("own")
-    made = glider("vehicle", "new", "mine.toml", "--own", cwd=folder)
+    made = glider("vehicle", "new", "mine", "--own", cwd=folder)
     assert made.returncode == 0, made.stderr
     model = module_of(folder / "mine_model.py")
 
@@ -165,7 +165,6 @@ def test_runs_without_a_case_file_are_a_case_where_their_vehicle_is_named(pool):
 MAPPING = """
 format = 1
 vehicle = "mine.toml"
-water_density_kg_m3 = 998.0
 [time]
 column = "stamp"
 unit = "ms"
@@ -207,7 +206,30 @@ def test_another_log_comes_into_the_columns_that_the_model_declares(pool):
     wrong = glider("import", "csv", *logs, "--map", "map.toml", "--out", "wrong", cwd=folder)
     assert wrong.returncode == 2
     assert "columns.psi_rad: no column of mine.toml" in wrong.stderr
+    (folder / "map.toml").write_text(MAPPING.replace('unit = "cm"', 'unit = "mbar"'))
+    no_density = glider("import", "csv", *logs, "--map", "map.toml", "--out", "wrong", cwd=folder)
+    assert no_density.returncode == 2
+    assert "water_density_kg_m3: missing key, which depth_m needs" in no_density.stderr
     assert not (folder / "wrong").exists()
+
+
+def test_the_mapping_to_fill_in_has_the_columns_of_the_model(pool):
+    """As it is written it brings run files of the model's own columns in."""
+    folder, case, _ = pool
+    case("own", 9, runs=2)
+    (folder / "maps").mkdir()
+    made = glider("import", "csv", "--template", "maps/own.toml", "--vehicle", "mine.toml", cwd=folder)
+    assert made.returncode == 0, made.stderr
+    text = (folder / "maps" / "own.toml").read_text()
+    (folder / "maps" / "own.toml").write_text(text.replace('column = "time"', 'column = "t_s"'))
+    logs = sorted((folder / "own").glob("run*.csv"))
+    done = glider("import", "csv", *logs, "--map", "maps/own.toml", "--out", "again", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    gaps = [json.loads(glider("gap", "measure", one, "--json", cwd=folder).stdout)["total"] for one in ("own", "again")]
+    assert gaps[1] == pytest.approx(gaps[0], rel=1e-6)
+    refused = glider("import", "csv", *logs, "--map", "maps/own.toml", "--vehicle", "mine.toml", cwd=folder)
+    assert refused.returncode == 2
+    assert "--template" in refused.stderr
 
 
 BLACK_BOX = """

@@ -19,6 +19,9 @@ map_option = click.option("--map", "mapping", metavar="NAME or FILE", help="Mapp
 template_option = click.option(
     "--template", type=click.Path(path_type=Path, dir_okay=False), help="Write a mapping to fill in."
 )
+vehicle_option = click.option(
+    "--vehicle", type=click.Path(path_type=Path, dir_okay=False), help="With --template: file of a model of your own."
+)
 folder_option = click.option(
     "--out", type=click.Path(path_type=Path), help="Folder for the case.  [default: beside the first file]"
 )
@@ -37,10 +40,11 @@ for _command in COMMANDS:
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path))
 @map_option
 @template_option
+@vehicle_option
 @folder_option
 @click.option("--strict", is_flag=True, help="Refuse damaged rows, also where the mapping leaves them out.")
 @json_option
-def csv(files, mapping, template, out, strict, as_json) -> None:
+def csv(files, mapping, template, vehicle, out, strict, as_json) -> None:
     """Turn CSV logs (.csv or .csv.gz), one a run, into a case, by a mapping file (docs/how-to/import.md).
 
     With --template a mapping with every key is written, and nothing imported.
@@ -49,7 +53,7 @@ def csv(files, mapping, template, out, strict, as_json) -> None:
     from glider.tools.data.runs.run import run_name
     from glider.tools.own.cases import import_target
 
-    if _asked_for(template, "template.toml", files, mapping):
+    if _asked_for(template, "template.toml", files, mapping, vehicle):
         return
     folder = files[0].parent / f"{run_name(files[0])}.case" if out is None else out
     check_writable(folder)
@@ -84,14 +88,19 @@ def qualisys(files, log, body, vehicle, out, as_json) -> None:
     print_lines(written, as_json, answer | {"columns": [asdict(one) for one in overview(runs)]})
 
 
-def _asked_for(template: Path | None, text: str, files: tuple[Path, ...], mapping: str | None) -> bool:
+def _asked_for(
+    template: Path | None, shipped: str, files: tuple[Path, ...], mapping: str | None, vehicle: Path | None
+) -> bool:
     """Whether a mapping to fill in was asked for, and is written; UsageError where neither that nor an import is."""
     from glider.tools.data.importers.mapping import write_template
+    from glider.tools.own.cases import import_template
 
+    if vehicle is not None and template is None:
+        raise click.UsageError("--vehicle goes with --template: a mapping names its own")
     if template is not None:
         if files or mapping is not None:
             raise click.UsageError("--template writes a mapping and imports nothing: give neither files nor --map")
-        write_template(template, text)
+        write_template(template, import_template(shipped, vehicle, template))
         say(f"mapping to fill in: {template}")
     elif not files or mapping is None:
         raise click.UsageError("give the logs and --map (--template FILE writes a mapping to fill in)")
@@ -112,25 +121,28 @@ def _say_imported(imported: "Imported", folder: Path, as_json: bool, more: dict[
     })  # fmt: skip
 
 
-def _import_streams(files, mapping, template, out, as_json, extra, package, read, partial=False) -> None:
+def _import_streams(files, mapping, template, vehicle, out, as_json, extra, package, read, partial=False) -> None:
     """What `import rosbag` and `import ardusub` have in common; read: the function that reads one file."""
     from glider.tools.data.importers.streams import TEMPLATE, import_streams
+    from glider.tools.own.cases import import_target
 
-    if _asked_for(template, TEMPLATE, files, mapping):
+    if _asked_for(template, TEMPLATE, files, mapping, vehicle):
         return
     need(extra, package)
     folder = files[0].parent / f"{files[0].stem}.case" if out is None else out
     check_writable(folder)
-    _say_imported(import_streams(list(files), mapping, folder, read, partial), folder, as_json, {})
+    imported = import_streams(list(files), mapping, folder, read, partial, import_target(mapping))
+    _say_imported(imported, folder, as_json, {})
 
 
 @import_.command("rosbag")
 @click.argument("files", metavar="[BAG]...", nargs=-1, type=click.Path(path_type=Path))
 @map_option
 @template_option
+@vehicle_option
 @folder_option
 @json_option
-def rosbag(files, mapping, template, out, as_json) -> None:
+def rosbag(files, mapping, template, vehicle, out, as_json) -> None:
     """Turn ROS 2 bags (SQLite or MCAP), one a run, into a case, by a mapping file (docs/how-to/import.md).
 
     A bag is its folder with metadata.yaml, or one of its files. With --template a mapping with every key is written,
@@ -138,17 +150,18 @@ def rosbag(files, mapping, template, out, as_json) -> None:
     """
     from glider.tools.data.importers.rosbag import read_rosbag
 
-    _import_streams(files, mapping, template, out, as_json, "ros", "rosbags", read_rosbag)
+    _import_streams(files, mapping, template, vehicle, out, as_json, "ros", "rosbags", read_rosbag)
 
 
 @import_.command("ardusub")
 @click.argument("files", metavar="[LOG]...", nargs=-1, type=click.Path(path_type=Path))
 @map_option
 @template_option
+@vehicle_option
 @folder_option
 @click.option("--partial", is_flag=True, help="Import what can be read of a cut or damaged log (default: refuse).")
 @json_option
-def ardusub(files, mapping, template, out, partial, as_json) -> None:
+def ardusub(files, mapping, template, vehicle, out, partial, as_json) -> None:
     """Turn logs of ArduSub (DataFlash .BIN or telemetry .tlog), one a run, into a case, by a mapping file.
 
     The shipped mappings ardusub-bin and ardusub-tlog take attitude, rates and depth. With --template a mapping with
@@ -156,4 +169,4 @@ def ardusub(files, mapping, template, out, partial, as_json) -> None:
     """
     from glider.tools.data.importers.ardusub import read_ardusub
 
-    _import_streams(files, mapping, template, out, as_json, "ardupilot", "pymavlink", read_ardusub, partial)
+    _import_streams(files, mapping, template, vehicle, out, as_json, "ardupilot", "pymavlink", read_ardusub, partial)

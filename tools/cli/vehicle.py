@@ -33,6 +33,7 @@ def new(out: Path, name: str | None, of_own: bool) -> None:
 
     Example: glider vehicle new mine.toml
     """
+    out = out if out.suffix else out.with_suffix(".toml")
     if out.exists():
         raise InputError("is there already: name another file", source=out)
     check_writable(out.parent)

@@ -1,9 +1,10 @@
 """Which vehicle a case is asked by: a file with `model`, by --vehicle or named in case.toml, or in a mapping."""
 
+import os
 import tomllib
 from pathlib import Path
 
-from glider.tools.data.importers.mapping import RUN_DATA, Target
+from glider.tools.data.importers.mapping import RUN_DATA, Target, template
 from glider.tools.data.runs.case import CASE_FILE
 from glider.tools.data.sources import read_text, vehicle_text
 from glider.tools.own.check import load_own
@@ -31,6 +32,14 @@ def own_vehicle(case: Path, wanted: str | None) -> LoadedVehicle | None:
     return load_own(path) if path.is_file() and is_own(read_text(path)) else None
 
 
+def import_template(name: str, vehicle: Path | None, out: Path) -> str:
+    """A shipped mapping to be filled in at `out`, of the columns that the model of a vehicle file declares."""
+    if vehicle is None:
+        return template(name)
+    target = _columns_of(vehicle)
+    return template(name, target.columns, os.path.relpath(vehicle.resolve(), out.resolve().parent))
+
+
 def import_target(mapping: str) -> Target:
     """The columns into which a mapping file brings a log: those that its vehicle's model declares, if it has one."""
     path = Path(mapping)
@@ -40,8 +49,13 @@ def import_target(mapping: str) -> Target:
         return RUN_DATA  # its reader says what is wrong
     for file in (path.parent / str(named), Path(str(named))):
         if file.is_file() and is_own(read_text(file)):
-            declared = read_own(file).declared
-            columns = (*(one.column for one in declared.inputs), *(one.column for one in declared.outputs))
-            held = frozenset(one.column for one in declared.inputs if not one.interpolated)
-            return Target(columns, held, frozenset(one.column for one in declared.outputs if one.angle), file)
+            return _columns_of(file)
     return RUN_DATA
+
+
+def _columns_of(file: Path) -> Target:
+    """The columns that the model of a vehicle file declares; InputError or ConfigError where it is none."""
+    declared = read_own(file).declared
+    columns = (*(one.column for one in declared.inputs), *(one.column for one in declared.outputs))
+    held = frozenset(one.column for one in declared.inputs if not one.interpolated)
+    return Target(columns, held, frozenset(one.column for one in declared.outputs if one.angle), file)

@@ -6,10 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glider.hal.strict import ConfigError
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers.rosbag import read_rosbag
 from glider.tools.data.importers.streams import import_streams
 from glider.tools.data.runs.case import load_case
+from glider.tools.own.cases import import_target, own_vehicle
+from glider.tools.own.runs import load_own_runs
+from glider.tools.own.skeleton import write_skeleton
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
 typesys = pytest.importorskip("rosbags.typesys")
@@ -144,6 +148,45 @@ def test_a_bag_becomes_a_case(bag, mapping, tmp_path):
     assert np.array_equal(run.columns["cmd_slider_m"], 0.01 * (np.floor(run.t + 1e-9) % 2))
     assert run.start_utc == "2025-11-24T16:00:00.000Z"
     assert math.isclose(run.t[-1], SECONDS - 0.02, abs_tol=0.1)
+
+
+OWN = """
+format = 1
+vehicle = "mine.toml"
+rate_hz = 10.0
+max_gap_s = 0.3
+[columns.thrust_n]
+topic = "/joints"
+field = "position[slider]"
+[columns.rudder_rad]
+topic = "/joints"
+field = "position[rail]"
+[columns.depth_m]
+topic = "/odometry"
+field = "pose.pose.position.z"
+sign = -1
+[columns.yaw_rad]
+topic = "/imu/data"
+field = "orientation.yaw"
+"""
+
+
+def test_a_bag_becomes_a_case_of_a_model_of_ones_own(bag, tmp_path):
+    write_skeleton(tmp_path / "mine.toml")
+    (tmp_path / "map.toml").write_text(OWN)
+    into = import_target(str(tmp_path / "map.toml"))
+    import_streams([bag], str(tmp_path / "map.toml"), tmp_path / "case", read_rosbag, into=into)
+    vehicle = own_vehicle(tmp_path / "case", None)
+    assert vehicle is not None
+    (run,) = load_own_runs(tmp_path / "case", vehicle.declared)
+    inside = slice(1, -1)
+    assert np.array_equal(run.inputs[:, 0], 10.0 * (np.floor(run.t + 1e-9) % 2))
+    assert np.allclose(run.outputs[inside, 0], 1.0 + 0.1 * run.t[inside], atol=1e-6)
+    assert np.allclose(run.outputs[inside, 1], attitude(run.t)[2][inside], atol=5e-4)
+    assert np.isnan(run.outputs[:, 2]).all()
+    (tmp_path / "map.toml").write_text(OWN.replace("sign = -1", 'unit = "Pa"'))
+    with pytest.raises(ConfigError, match="water_density_kg_m3: missing key, which depth_m needs"):
+        import_streams([bag], str(tmp_path / "map.toml"), tmp_path / "no", read_rosbag, into=into)
 
 
 def test_times_may_be_those_of_recording(bag, tmp_path):

@@ -1,7 +1,6 @@
 """Anybody's CSV log into run data, by a mapping file."""
 
 import fnmatch
-import os
 import re
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -10,19 +9,26 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from glider.firmware.model.library import shipped
 from glider.hal.units import units_of
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers import resample
 from glider.tools.data.importers.commands import CommandTable, rebuild, says, seen_direction
-from glider.tools.data.importers.mapping import RUN_DATA, TIME_UNITS, ColumnTable, CutTable, MapTable, Target, load_map
+from glider.tools.data.importers.mapping import (
+    RUN_DATA,
+    TIME_UNITS,
+    ColumnTable,
+    CutTable,
+    MapTable,
+    Target,
+    load_map,
+    vehicle_of,
+)
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.case import write_case
 from glider.tools.data.runs.gate import refuse_impossible, wrong_times
 from glider.tools.data.runs.origin import moment_text
 from glider.tools.data.runs.run import Run
-from glider.tools.data.sources import name_or_path
 
 MAX_ROWS = 10_000_000  # of one run: what a mistaken time unit would ask for
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d*)?))?")
@@ -51,11 +57,7 @@ def import_csv(paths: list[Path], map_name: str, out: Path, strict: bool = False
         text = msgspec.structs.replace(mapping.text, broken_rows="refuse", bad_fields="refuse")
         time = msgspec.structs.replace(mapping.time, not_increasing="refuse")
         mapping = msgspec.structs.replace(mapping, text=text, time=time)
-    vehicle, vehicle_text = mapping.vehicle, None
-    if into.vehicle is not None:
-        vehicle = os.path.relpath(into.vehicle.resolve(), out.resolve())
-    elif vehicle not in shipped("model/vehicles"):
-        vehicle_text, _ = name_or_path(vehicle, "vehicle", "model/vehicles", base=base)
+    vehicle, vehicle_text = vehicle_of(mapping, base, out, into)
     sources = [_Source(path, mapping, into) for path in paths]
     runs = [source.run(f"run{number:02d}") for number, source in enumerate(sources)]
     notes = [note for source in sources for note in source.said()]

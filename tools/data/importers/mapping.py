@@ -5,25 +5,29 @@
 docs/how-to/import.md explains every key with an example.
 """
 
+import json
+import os
+import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Protocol, TypeVar
 
 import msgspec
 import numpy as np
 
 from glider.firmware.core.vehicle.layout import GRAVITY
+from glider.firmware.model.library import shipped
 from glider.hal.strict import ConfigError, Table, decode, locate
 from glider.hal.units import UNITS, units_of
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers.commands import CommandTable
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.csvfile import Dialect, write_bytes
-from glider.tools.data.sources import read_text
+from glider.tools.data.sources import name_or_path, read_text
 
 # 'counts' is for values that `scale` alone turns into the target's SI unit.
 COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "volume", "pressure", "counts")
@@ -66,16 +70,22 @@ class ConversionTable(Table):
         if self.valid is not None and not self.valid[0] < self.valid[1]:
             raise ValueError(f"valid: expected [low, high] with low < high, got {list(self.valid)}")
 
-    def factor(self, density: float, mass: bool = False) -> float:
+    def needs_density(self, name: str) -> bool:
+        """Whether the water's density turns this into the column of a name."""
+        kind = UNITS[self.unit].kind
+        return kind == "pressure" or (kind == "volume" and name.endswith("_kg"))
+
+    def factor(self, density: float | None, mass: bool = False) -> float:
         """From logged steps to SI; a pressure becomes a depth of water of this density, kg/m3, a volume its `mass`."""
         kind, factor = UNITS[self.unit]
+        density = np.nan if density is None else density  # is there where it is needed (`check_rest`)
         if kind == "volume" and mass:
             factor *= density
         if kind == "pressure":
             factor /= density * GRAVITY
         return self.sign * self.scale * factor
 
-    def converted(self, logged: np.ndarray, density: float, mass: bool = False) -> np.ndarray:
+    def converted(self, logged: np.ndarray, density: float | None, mass: bool = False) -> np.ndarray:
         """Logged numbers in SI; what is outside `valid` is missing."""
         values = self.factor(density, mass) * (logged - self.zero) + self.offset
         if self.valid is not None:
@@ -119,9 +129,10 @@ class MapTable(Table):
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     vehicle: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
-    water_density_kg_m3: Annotated[float, msgspec.Meta(ge=900.0, le=1300.0)]
     time: TimeTable
     columns: Annotated[dict[str, ColumnTable], msgspec.Meta(min_length=1)]
+    # of a user's model only where a pressure or a volume is turned into a depth or a mass
+    water_density_kg_m3: Annotated[float, msgspec.Meta(ge=900.0, le=1300.0)] | None = None
     site: Annotated[str, msgspec.Meta(max_length=1000)] = ""
     extra: dict[str, ColumnTable] = msgspec.field(default_factory=dict)
     # Means at this rate; without it, row by row.
@@ -153,12 +164,49 @@ def check_columns(columns: Mapping[str, ConversionTable], source: str, target: T
             raise ConfigError(source, f"{column.unit!r} is no unit of {wanted}", key=f"columns.{name}.unit")
 
 
-def _check(mapping: MapTable, source: str, target: Target) -> None:
-    """What no single table can see; ConfigError."""
-    check_columns(mapping.columns, source, target)
+class AnyMap(Protocol):
+    """What mappings of all kinds have."""
+
+    @property
+    def vehicle(self) -> str: ...
+    @property
+    def water_density_kg_m3(self) -> float | None: ...
+    @property
+    def columns(self) -> Mapping[str, ConversionTable]: ...
+    @property
+    def extra(self) -> Mapping[str, ConversionTable]: ...
+    @property
+    def rates_from_attitude(self) -> bool: ...
+
+
+def check_rest(mapping: AnyMap, source: str, target: Target) -> None:
+    """ConfigError where the water's density or the attitude is needed and missing, or a name is taken."""
+    if mapping.water_density_kg_m3 is None:
+        by = [name for name, one in {**mapping.columns, **mapping.extra}.items() if one.needs_density(name)]
+        if by or target.vehicle is None:
+            why = f", which {by[0]} needs" if by else ""
+            raise ConfigError(source, f"missing key{why}", key="water_density_kg_m3")
     for name in mapping.extra:
         if name in target.columns or not name.strip():
             raise ConfigError(source, "the name is taken by a column of run data", key=f"extra.{name}")
+    if mapping.rates_from_attitude and not all(name in mapping.columns for name in names.ATTITUDE):
+        raise ConfigError(source, f"needs {', '.join(names.ATTITUDE)}", key="rates_from_attitude")
+
+
+def vehicle_of(mapping: AnyMap, base: Path, out: Path, target: Target) -> tuple[str, str | None]:
+    """How the case in the folder `out` names its vehicle, and the text of a file that is copied beside it; `base`: the
+    mapping's folder."""
+    if target.vehicle is not None:
+        return os.path.relpath(target.vehicle.resolve(), out.resolve()), None
+    if mapping.vehicle in shipped("model/vehicles"):
+        return mapping.vehicle, None
+    return mapping.vehicle, name_or_path(mapping.vehicle, "vehicle", "model/vehicles", base=base)[0]
+
+
+def _check(mapping: MapTable, source: str, target: Target) -> None:
+    """What no single table can see; ConfigError."""
+    check_columns(mapping.columns, source, target)
+    check_rest(mapping, source, target)
     for name, command in mapping.commands.items():
         if name not in names.COMMANDS or name in mapping.columns:
             raise ConfigError(
@@ -166,8 +214,6 @@ def _check(mapping: MapTable, source: str, target: Target) -> None:
             )
         if command.follows not in mapping.columns:
             raise ConfigError(source, f"[columns] has no {command.follows!r}", key=f"commands.{name}.follows")
-    if mapping.rates_from_attitude and not all(name in mapping.columns for name in names.ATTITUDE):
-        raise ConfigError(source, f"needs {', '.join(names.ATTITUDE)}", key="rates_from_attitude")
     if mapping.max_gap_s and mapping.rate_hz is None:
         raise ConfigError(source, "needs rate_hz: a log taken row by row has no gaps to fill", key="max_gap_s")
 
@@ -219,11 +265,34 @@ def _with_column(error: ConfigError, text: str, source: str, by_name: Mapping[st
     return error
 
 
-def write_template(path: Path, name: str) -> None:
-    """A mapping with every key, commented, to be filled in; InputError where the file is there already."""
+def template(name: str, columns: Sequence[str] = (), vehicle: str = "") -> str:
+    """A shipped mapping with every key, commented, to be filled in.
+
+    columns: those that the user's model in the file `vehicle` declares, instead of run data's.
+    """
+    text = files("glider.tools.data.importers").joinpath(name).read_text(encoding="utf-8")
+    if not columns:
+        return text
+    head, _, rest = text.partition(f"[columns.{names.DEPTH}]\n")
+    head = re.sub(r"(?m)^vehicle = .*\n( +#.*\n)?", f"vehicle = {json.dumps(vehicle)}\n", head)
+    head = re.sub(r"(?m)^water_density", "# water_density", head)
+    keys = rest.partition("\n\n")[0].splitlines()
+    needed = [key for key in keys if key.startswith(("source", "topic", "field"))]
+    optional = [key if key.startswith("#") else f"# {key}" for key in keys if key not in needed]
+    tables = list[str]()
+    for column in columns:
+        lines = [re.sub(r'(source|topic) = "[^"]*"', rf'\1 = "{column}"', key) for key in needed]
+        if tables:
+            lines, optional = [line.partition("  #")[0].rstrip() for line in lines], []
+        tables.append("\n".join([f"[columns.{column}]", *lines, *optional]))
+    return head + "\n\n".join([*tables, rest[rest.index("# [extra.") :]])
+
+
+def write_template(path: Path, text: str) -> None:
+    """Write a mapping to be filled in; InputError where the file is there already."""
     if path.exists():
         raise InputError("is there already: name another file", source=path)
-    write_bytes(path, files("glider.tools.data.importers").joinpath(name).read_bytes())
+    write_bytes(path, text.encode("utf-8"))
 
 
 def load_map(wanted: str, target: Target = RUN_DATA) -> tuple[MapTable, Path]:
@@ -233,14 +302,14 @@ def load_map(wanted: str, target: Target = RUN_DATA) -> tuple[MapTable, Path]:
 
 def load_mapping(wanted: str, folder: str, decode_text: Callable[[str, str], M]) -> tuple[M, Path]:
     """The same of another kind of mapping, whose shipped ones stand in `folder`."""
-    shipped = {
+    ours = {
         entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
         for entry in files("glider.tools.data.importers").joinpath(folder).iterdir()
         if entry.name.endswith(".toml")
     }
-    if wanted in shipped:
-        return decode_text(shipped[wanted], f"{wanted} (shipped)"), Path()
+    if wanted in ours:
+        return decode_text(ours[wanted], f"{wanted} (shipped)"), Path()
     path = Path(wanted)
     if path.is_file():
         return decode_text(read_text(path), str(path)), path.parent
-    raise InputError(f"no mapping '{wanted}': neither a file nor one of {', '.join(sorted(shipped))}")
+    raise InputError(f"no mapping '{wanted}': neither a file nor one of {', '.join(sorted(ours))}")

@@ -7,23 +7,27 @@ each the mean of the samples nearest to it; a command holds from its message unt
 import fnmatch
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
 
-from glider.firmware.model.library import shipped
-from glider.hal.strict import ConfigError, Table
+from glider.hal.strict import Table
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers import resample
 from glider.tools.data.importers.csvlog import MAX_ROWS, Imported
 from glider.tools.data.importers.mapping import (
+    RUN_DATA,
     ConversionTable,
     CutTable,
+    Target,
     check_columns,
+    check_rest,
     decode_checked,
     load_mapping,
+    vehicle_of,
 )
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs import csvfile
@@ -31,7 +35,6 @@ from glider.tools.data.runs.case import write_case
 from glider.tools.data.runs.gate import refuse_impossible, wrong_times
 from glider.tools.data.runs.origin import moment_text
 from glider.tools.data.runs.run import Run
-from glider.tools.data.sources import name_or_path
 
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=300)]
 EULER = ("roll", "pitch", "yaw")  # last parts of a field that are computed of a quaternion x, y, z, w
@@ -50,9 +53,10 @@ class StreamMap(Table, kw_only=True):
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     vehicle: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
-    water_density_kg_m3: Annotated[float, msgspec.Meta(ge=900.0, le=1300.0)]
     rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=10_000.0)]
     columns: Annotated[dict[str, StreamColumn], msgspec.Meta(min_length=1)]
+    # of a user's model only where a pressure or a volume is turned into a depth or a mass
+    water_density_kg_m3: Annotated[float, msgspec.Meta(ge=900.0, le=1300.0)] | None = None
     extra: dict[str, StreamColumn] = msgspec.field(default_factory=dict)
     site: Annotated[str, msgspec.Meta(max_length=1000)] = ""
     frame: Literal["enu", "ned"] = "enu"  # of quaternions: body x forward, y left, z up in ENU; or y right, z down
@@ -62,18 +66,15 @@ class StreamMap(Table, kw_only=True):
     cut: tuple[CutTable, ...] = ()
 
 
-def _check(mapping: StreamMap, source: str) -> None:
-    check_columns(mapping.columns, source)
-    for name in mapping.extra:
-        if name in names.KNOWN or not name.strip():
-            raise ConfigError(source, "the name is taken by a column of run data", key=f"extra.{name}")
-    if mapping.rates_from_attitude and not all(name in mapping.columns for name in names.ATTITUDE):
-        raise ConfigError(source, f"needs {', '.join(names.ATTITUDE)}", key="rates_from_attitude")
+def _check(mapping: StreamMap, source: str, target: Target) -> None:
+    check_columns(mapping.columns, source, target)
+    check_rest(mapping, source, target)
 
 
-def decode_stream_map(text: str, source: str) -> StreamMap:
+def decode_stream_map(text: str, source: str, target: Target = RUN_DATA) -> StreamMap:
     """A mapping file's text; raises ConfigError with file, line and key."""
-    return decode_checked(text, source, StreamMap, _check, {"columns": StreamColumn, "extra": StreamColumn})
+    by_name = {"columns": StreamColumn, "extra": StreamColumn}
+    return decode_checked(text, source, StreamMap, partial(_check, target=target), by_name)
 
 
 @dataclass
@@ -107,22 +108,24 @@ class Stream:
 Reader = Callable[[Path, StreamMap, bool], Stream]
 
 
-def import_streams(paths: list[Path], map_name: str, out: Path, read: Reader, accept_cut: bool = False) -> Imported:
+def import_streams(
+    paths: list[Path], map_name: str, out: Path, read: Reader, accept_cut: bool = False, into: Target = RUN_DATA
+) -> Imported:
     """Write files as the runs of a case; InputError or ConfigError, one line, where that cannot be.
 
-    read(path, mapping, accept_cut): of one file the samples that the mapping asks for.
+    read(path, mapping, accept_cut): of one file the samples that the mapping asks for; into: the columns that its
+    vehicle has.
     """
-    mapping, base = load_mapping(map_name, FOLDER, decode_stream_map)
-    vehicle, vehicle_text = mapping.vehicle, None
-    if vehicle not in shipped("model/vehicles"):
-        vehicle_text, _ = name_or_path(vehicle, "vehicle", "model/vehicles", base=base)
+    mapping, base = load_mapping(map_name, FOLDER, partial(decode_stream_map, target=into))
+    vehicle, vehicle_text = vehicle_of(mapping, base, out, into)
     runs, notes = [], []
     for number, path in enumerate(paths):
         stream = read(path, mapping, accept_cut)
-        run, said = run_of_stream(path, f"run{number:02d}", stream, mapping)
+        run, said = run_of_stream(path, f"run{number:02d}", stream, mapping, into)
         runs.append(run)
         notes += [f"{path}: {note}" for note in [*stream.notes, *said]]
-    refuse_impossible(runs)
+    if into.vehicle is None:
+        refuse_impossible(runs)
     everything = {**mapping.columns, **mapping.extra}
     files = write_case(
         out, runs, vehicle=vehicle, vehicle_text=vehicle_text, site=mapping.site, log_rate_hz=mapping.rate_hz,
@@ -132,7 +135,9 @@ def import_streams(paths: list[Path], map_name: str, out: Path, read: Reader, ac
     return Imported(out, runs, files, [{} for _ in runs], notes)
 
 
-def run_of_stream(path: Path, name: str, stream: Stream, mapping: StreamMap) -> tuple[Run, list[str]]:
+def run_of_stream(
+    path: Path, name: str, stream: Stream, mapping: StreamMap, into: Target = RUN_DATA
+) -> tuple[Run, list[str]]:
     """The samples of a file as a run with even rows, and what a person should know of it."""
     wanted: Mapping[str, StreamColumn] = {**mapping.columns, **mapping.extra}
     taken, notes = {}, []
@@ -158,10 +163,10 @@ def run_of_stream(path: Path, name: str, stream: Stream, mapping: StreamMap) -> 
     grid = np.arange(count) / mapping.rate_hz
     columns = {names.TIME: grid}
     for target, (t, values) in taken.items():
-        if target in names.COMMANDS:
+        if target in into.held:
             columns[target] = resample.zero_order_hold(t, values, grid + begin)
             continue
-        angle = target in names.WRAPPING
+        angle = target in into.angles
         mean = resample.means(values, resample.bins_of(t, begin, mapping.rate_hz), count, angle)
         columns[target] = resample.fill_gaps(mean, grid + begin, t, values, mapping.max_gap_s, angle)
     wrong = wrong_times(grid)
@@ -170,7 +175,7 @@ def run_of_stream(path: Path, name: str, stream: Stream, mapping: StreamMap) -> 
     if mapping.rates_from_attitude:
         rates = resample.body_rates(grid, *(columns[angle] for angle in names.ATTITUDE))
         columns |= {rate: found for rate, found in zip(names.RATES, rates, strict=True) if rate not in columns}
-    numbers = {target: columns[target] for target in names.in_order(list(columns)) if target in names.KNOWN}
+    numbers = {target: columns[target] for target in (names.TIME, *into.columns) if target in columns}
     extra = {target: csvfile.as_texts(target, columns[target], item.decimals) for target, item in mapping.extra.items()}
     start = "" if stream.epoch_s is None else moment_text(stream.epoch_s + begin)
     return Run(name, path, numbers, extra, path.name, start), notes

@@ -221,7 +221,7 @@ def write_case(
     vehicle_text: str | None = None,
     site: str,
     log_rate_hz: float,
-    water_density_kg_m3: float,
+    water_density_kg_m3: float | None,
     motion_capture: bool | None = None,
     sensors: SensorsPart | SensorsTable | None = None,
     disturbance: DisturbancePart | DisturbanceTable | None = None,
@@ -244,9 +244,12 @@ def write_case(
         motion_capture = any(run.has_mocap for run in runs)
     facts = {
         "vehicle": vehicle if vehicle_text is None else VEHICLE_FILE, "site": site, "log_rate_hz": float(log_rate_hz),
-        "water_density_kg_m3": float(water_density_kg_m3), "motion_capture": bool(motion_capture), "runs": len(runs),
+        "water_density_kg_m3": water_density_kg_m3, "motion_capture": bool(motion_capture), "runs": len(runs),
     }  # fmt: skip
-    text = case_text(facts, sensors, disturbance)
+    if water_density_kg_m3 is None:  # of a user's model, whose cases need none
+        text = toml_text({"format": 1, **facts})
+    else:
+        text = case_text(facts | {"water_density_kg_m3": float(water_density_kg_m3)}, sensors, disturbance)
     if folder.is_dir() and ((folder / CASE_FILE).exists() or run_files(folder)):
         raise InputError("the folder already holds a case: name another, or empty it", source=folder)
     folder.mkdir(parents=True, exist_ok=True)
