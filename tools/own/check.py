@@ -11,6 +11,8 @@ from glider.tools.own.declare import USUAL_START
 from glider.tools.own.load import LoadedVehicle, called, read_own
 
 TRIED, SEED, STEP_SECONDS = 4, 20260, 0.05  # states about rest; of their draws; s
+ENERGY_SECONDS, GROWS = 1e-4, 1e-3  # along the motion; of the powers that flow between states
+ENERGY_SCALES, ENERGY_STATES = (0.1, 1.0, 10.0), 40  # times the usual states about rest; states of each
 SMOOTH_STEPS, SMOOTH = (1e-3, 1e-5), 0.3  # of a parameter's uncertainty; by which its two derivatives may differ
 
 
@@ -24,14 +26,14 @@ class Trial:
     theta: np.ndarray
 
 
-def trials(vehicle: LoadedVehicle) -> list[Trial]:
-    """States about rest, small inputs, the file's parameters."""
+def trials(vehicle: LoadedVehicle, count: int = TRIED, times: float = 1.0) -> list[Trial]:
+    """States about rest, `times` as far as is usual, small inputs, the file's parameters."""
     x, u, w, theta = vehicle.zeros()
     random = np.random.default_rng(SEED)
     scale = np.array([one.start_uncertainty or USUAL_START.get(one.unit, 0.1) for one in vehicle.declared.states])
     found = [Trial(x, u, w, theta)]
-    for _ in range(TRIED - 1):
-        moved = x + scale * random.standard_normal(len(x)) if len(x) else x
+    for _ in range(count - 1):
+        moved = x + times * scale * random.standard_normal(len(x)) if len(x) else x
         found.append(Trial(moved, 0.1 * random.standard_normal(len(u)), w, theta))
     return found
 
@@ -62,7 +64,7 @@ def check_model(vehicle: LoadedVehicle) -> list[str]:
         if count:
             notes.append(f"{name} has no finite answer at {count} of {len(points)} states tried about rest")
     _pure(vehicle, motion, points)
-    return notes + _not_smooth(vehicle, motion, points[-1])
+    return notes + _not_smooth(vehicle, motion, points[-1]) + _energy_grows(vehicle, motion)
 
 
 def arguments(name: str, point: Trial) -> tuple[Any, ...]:
@@ -150,3 +152,29 @@ def _not_smooth(vehicle: LoadedVehicle, motion: str, point: Trial) -> list[str]:
         if np.isfinite(size) and size > 1e-6 and np.abs(slopes[0] - slopes[1]).max() > SMOOTH * size:
             notes.append(f"{motion} is not smooth in {one.name}: its derivative depends on the step")
     return notes
+
+
+def _energy_grows(vehicle: LoadedVehicle, motion: str) -> list[str]:
+    """Whether the energy that a model declares, energy(x, theta), grows though nothing drives it and no noise acts: a
+    note with the state in which it grows most, by what flows through each state."""
+    if not hasattr(vehicle.model, "energy"):
+        return []
+    names, worst = [one.name for one in vehicle.declared.states], (0.0, "", 0.0)
+    for point in (one for times in ENERGY_SCALES for one in trials(vehicle, ENERGY_STATES, times)):
+        u, dt = np.zeros_like(point.u), ENERGY_SECONDS
+        given = (point.x, u, point.w, point.theta, dt) if motion == "step" else (point.x, u, point.w, point.theta)
+        moved = _call(vehicle, motion, given, len(names))
+        change = moved - point.x if motion == "step" else dt * moved
+        powers = np.zeros(len(names))
+        for k in range(len(names)):
+            ends = [point.x + side * np.where(np.arange(len(names)) == k, change, 0.0) for side in (1.0, -1.0)]
+            high, low = (float(called(vehicle, "energy", x, point.theta)) for x in ends)
+            powers[k] = (high - low) / (2.0 * dt)
+        total, flowing = float(powers.sum()), float(np.abs(powers).sum())
+        if np.isfinite(total) and total > GROWS * flowing and total > worst[0]:
+            worst = total, names[int(np.argmax(powers))], flowing
+    if not worst[1]:
+        return []
+    power, name, flowing = worst
+    return [f"energy grows by {power:.2g} W (of {flowing:.2g} W that flow) with all inputs at 0, most by {name}: "
+            "a sign in a coupling or a damping term?"]  # fmt: skip

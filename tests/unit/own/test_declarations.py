@@ -1,5 +1,6 @@
 """What a user's model declares, and ten mistakes in one: each a line that names it."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -139,6 +140,32 @@ def test_a_missing_column_is_named_with_its_file(vehicle, tmp_path):
 def test_a_parameter_with_a_threshold_is_noted(vehicle):
     found = load_own(vehicle("u[0] - theta[0] * abs", "(1.0 if theta[0] > 4.0005 else 0.0) + u[0] - theta[0] * abs"))
     assert any("smooth" in note and "drag" in note for note in check_model(found))
+
+
+ENERGY = """
+
+def energy(x, theta):
+    return 0.5 * (MASS * x[4:10]) @ x[4:10] - theta[4] * x[0] - WEIGHT * CG_Z * np.cos(x[1]) * np.cos(x[2])
+"""
+SHIP = (Path(__file__).parents[3] / "docs" / "examples" / "fossen_auv" / "remus.py").read_text()
+HULL = SHIP.replace(
+    "BODY_LIFT, FIN_MOMENT, FIN_DAMPING = 60.0, 55.0, 12.0", "BODY_LIFT, FIN_MOMENT, FIN_DAMPING = 0.0, 0.0, 0.0"
+)
+BARE = HULL.replace(" - LINEAR * nu - QUADRATIC * nu * np.abs(nu)", "").replace("- theta[3] * nu[0] * abs(nu[0])", "")
+
+
+@pytest.mark.parametrize(("hull", "old", "new", "noted"), [
+    (HULL, "", "", False), (BARE, "", "", False), (HULL, "- LINEAR * nu -", "+ LINEAR * nu -", True),
+    (BARE, "force -= cross(turn", "force += cross(turn", True),
+    (BARE, "moment -= cross(velocity", "moment += cross(velocity", True),
+    (BARE, "moment = WEIGHT *", "moment = -WEIGHT *", True),
+])  # fmt: skip
+def test_energy_that_comes_from_nowhere_is_noted(tmp_path, hull, old, new, noted):
+    assert old in hull
+    assert BARE != HULL != SHIP
+    (tmp_path / "ship.py").write_text(hull.replace(old, new) + ENERGY)
+    (tmp_path / "v.toml").write_text('format = 1\nmodel = "ship"\n')
+    assert any("energy grows" in note for note in check_model(load_own(tmp_path / "v.toml"))) == noted
 
 
 def test_a_file_without_a_model_is_no_vehicle_of_ones_own(tmp_path):
