@@ -149,8 +149,8 @@ def identify(vehicle: Any, cases: Sequence[Path], out: Path | None, as_json: boo
         return
     gap = answer["gap"]
     click.echo(
-        f"runs left out: {gap['before']['total']:.2f} -> {gap['after']['total']:.2f} tolerances; "
-        f"handed out: {answer['handed_out']}"
+        f"runs left out: {gap['before']['total']:.2f} -> {gap['after']['total']:.2f} tolerances, channels by "
+        f"{answer['channel_ratio']:.2f} on average; handed out: {answer['handed_out']}"
     )
     for name in (name for name in gap["before"] if name != "total" and gap["before"][name] is not None):
         click.echo(f"  {name:<12} {gap['before'][name]:6.2f} -> {gap['after'][name]:6.2f}")

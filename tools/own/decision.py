@@ -31,6 +31,19 @@ GROUP_MASS, MOST_GROUP = 0.9, 3  # of the probability of causes, that a group ho
 
 
 @dataclass(frozen=True)
+class UsualLabels:
+    """What healthy runs show of every label alone, beside what they differ by, in spreads (labels,)."""
+
+    scatter: np.ndarray  # 1 sigma from run to run
+    mean: np.ndarray  # of all runs
+    error: np.ndarray  # 1 sigma of that
+
+    def of_another_set(self, k: int, runs: int, session_share: float) -> tuple[float, float]:
+        """Mean and variance of label k over some runs of a session; session_share: `Healthy`'s."""
+        return float(self.mean[k]), float(self.error[k] ** 2 + self.scatter[k] ** 2 * (session_share + 1.0 / runs))
+
+
+@dataclass(frozen=True)
 class Healthy:
     """What is known of the vehicle without a change, in the spreads of `effects`."""
 
@@ -38,7 +51,7 @@ class Healthy:
     V: np.ndarray  # (k, k) covariance of the identified values
     scatter: np.ndarray  # (k,) what runs differ by, integrated out
     session: np.ndarray  # (k,) what sessions differ by beside it
-    usual: np.ndarray  # (k,) how far each label alone differs from run to run beside that
+    usual: UsualLabels
     errors: ChannelErrors  # what healthy runs leave
     eta: float
     runs: int  # that it is known from
@@ -134,47 +147,48 @@ def form_variance(healthy: Healthy, reach: float, moved: float) -> float:
 
 
 def usual_share(
-    healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int, moved: float = 0.0
-) -> tuple[float, float]:
+    healthy: Healthy, k: int, reach: float, size: float, sd: float, runs: int, moved: float = 0.0, gain: float = np.inf
+) -> float:
     """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it, and the form of
-    effects beside it, bring too, and all of that evidence, by a parabola.
+    effects beside it, bring too, by a parabola; one that gains no more than `gain` nat, which is what the label does.
 
     reach: tolerances that a spread of it moves the channels; moved: mean square that those effects move them by.
     """
-    usual = healthy.usual[k] ** 2 * (healthy.session_share + 1.0 / runs) + form_variance(healthy, reach, moved)
+    mean, usual = healthy.usual.of_another_set(k, runs, healthy.session_share)
+    usual += form_variance(healthy, reach, moved)
 
-    def odds(scatter: float) -> float:
-        narrow = scatter + sd**2
+    def odds(mean: float, scatter: float, variance: float) -> float:
+        narrow, beyond = scatter + variance, (size - mean) ** 2
         wide = (SIZES / max(reach, LEAST_REACH)) ** 2 + narrow
-        change = logsumexp(-0.5 * (size**2 / wide + np.log(wide))) - np.log(len(SIZES))
-        return float(change + 0.5 * (size**2 / narrow + np.log(narrow)))
+        change = logsumexp(-0.5 * (beyond / wide + np.log(wide))) - np.log(len(SIZES))
+        return float(change + 0.5 * (beyond / narrow + np.log(narrow)))
 
-    return max(0.0, odds(0.0) - odds(usual)), odds(0.0)
+    variance = sd**2 * max(1.0, odds(0.0, 0.0, sd**2) / max(gain, 1e-9))
+    return max(0.0, odds(0.0, 0.0, variance) - odds(mean, usual, variance))
 
 
 def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: int) -> np.ndarray:
-    """Log evidence of hypotheses (hypotheses,), each with what a usual deviation of one label more brings it, and
+    """Log evidence of hypotheses (hypotheses,), each with what usual deviations of further labels bring it, and
     without what the form of some of its effects would bring that another has.
 
-    What healthy runs show of a label is no change: a hypothesis without it explains that much, too. Far from what is
-    usual the likelihood is no parabola: of what a label really gains the same part is taken.
+    What healthy runs show of a label is no change: a hypothesis without it explains that much, too, and so on with a
+    label more. Far from what is usual the likelihood is no parabola: one that gains what a label really does is taken.
     """
     gained = dict[frozenset[str], float]()
     for one in sorted(every, key=lambda one: one.evidence):  # labels that were fitted twice: the better fit
         gained[frozenset(one.labels)] = one.evidence - log_prior(healthy, one.labels)
     most, by_form = dict.fromkeys(gained, 0.0), dict.fromkeys(gained, 0.0)
-    for one in every:
+    for one in sorted(every, key=lambda one: -len(one.labels)):  # of one with a label more it is known what that has
         own = frozenset(one.labels)
         moves = (one.sizes * reach[healthy.at(one.labels)]) ** 2
         for n, (label, k) in enumerate(zip(one.labels, healthy.at(one.labels), strict=True)):
             if own - {label} not in gained:
                 continue
             about = healthy, k, float(reach[k]), float(one.sizes[n]), float(one.sd[n]), runs
-            (usual, all_of_it), (both, _) = usual_share(*about), usual_share(*about, float(moves.sum() - moves[n]))
             gain = gained[own] - gained[own - {label}]
-            part = float(np.clip(gain / all_of_it, 0.0, 1.0)) if all_of_it > 0.0 else 1.0
-            most[own - {label}] = max(most[own - {label}], part * usual)
-            by_form[own] = max(by_form[own], part * (both - usual))
+            usual = usual_share(*about, gain=gain)
+            most[own - {label}] = max(most[own - {label}], most[own] + (usual if gain > 0.0 else gain))
+            by_form[own] = max(by_form[own], usual_share(*about, float(moves.sum() - moves[n]), gain) - usual)
     return np.array([one.evidence + most[frozenset(one.labels)] - by_form[frozenset(one.labels)] for one in every])
 
 

@@ -76,6 +76,8 @@ class IdentifiedTable(Table):
     run_inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of what runs say of the values they share
     channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
+    label_mean: dict[str, float] = msgspec.field(default_factory=dict)  # what all runs show of each label alone
+    label_mean_error: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # 1 sigma of that
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
     # NOISE_by_INPUT: force a unit of the input; NOISE_at_POINT: force (operating_points.py)
     form: dict[str, float] = msgspec.field(default_factory=dict)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glider.tools.inference.hyperparameters import HEALTHY
-from glider.tools.own.decision import Healthy
+from glider.tools.own.decision import Healthy, UsualLabels
 from glider.tools.own.declare import RUN
 from glider.tools.own.effects import NOISE, ModelPoint, form_errors, moved, noise_effects, standard_effects, unexplained
 from glider.tools.own.error_components import Components, Whitening, patterns
@@ -26,7 +26,8 @@ def healthy_of(observer: Observer) -> Healthy:
     names = [one.label for one in effects]
     k = len(effects)
     # noise of healthy runs is taken from the evidence of more by itself (`noise_gain`)
-    usual = np.array([0.0 if one.family == NOISE else USUAL_SCATTER for one in effects])
+    usual_scatter = np.array([0.0 if one.family == NOISE else USUAL_SCATTER for one in effects])
+    usual = UsualLabels(usual_scatter, np.zeros(k), np.zeros(k))
     scatter, V = np.zeros(k), np.zeros((k, k))
     if table is None:
         for one in declared.parameters:
@@ -36,7 +37,7 @@ def healthy_of(observer: Observer) -> Healthy:
         errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
         scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
         session = np.sqrt(USUAL_SESSION_SHARE) * scatter
-        return Healthy(effects, V, scatter, session, np.zeros(k), errors, 1.0, 1, HEALTHY.run_scale)
+        return Healthy(effects, V, scatter, session, UsualLabels(*np.zeros((3, k))), errors, 1.0, 1, HEALTHY.run_scale)
     # an effect that the vehicle has of an input that never moves here is none of these runs
     known = [n for n, name in enumerate(table.parameters) if name in names]
     places = [names.index(table.parameters[n]) for n in known]
@@ -50,7 +51,8 @@ def healthy_of(observer: Observer) -> Healthy:
     shared = table.session_scatter or {
         name: float(np.sqrt(table.session_share)) * value for name, value in table.scatter.items()
     }
-    for into, values in ((scatter, table.scatter), (session, shared), (usual, table.label_scatter)):
+    for into, values in ((scatter, table.scatter), (session, shared), (usual.scatter, table.label_scatter),
+                         (usual.mean, table.label_mean), (usual.error, table.label_mean_error)):  # fmt: skip
         for name, value in values.items():
             if name in names:
                 into[names.index(name)] = value / effects[names.index(name)].spread

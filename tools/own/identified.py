@@ -57,7 +57,9 @@ def tables(found: Identified) -> dict[str, Any]:
     sd = np.sqrt(np.diag(errors))
     scatter = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.scatter, strict=True)}
     session = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.session_scatter, strict=True)}
-    labels = {one.label: float(s * one.spread) for one, s in zip(found.labels, found.label_scatter, strict=True)}
+    usual = {name: {one.label: float(s * one.spread) for one, s in zip(found.labels, row, strict=True)}
+             for name, row in (("label_mean", found.usual.mean), ("label_mean_error", found.usual.error),
+                               ("label_scatter", found.usual.scatter))}  # fmt: skip
     parameters = given.setdefault("parameters", {})
     sensors = given.setdefault("sensors", {})
     names, places, form, effects = [], [], {}, dict(declared.effects)
@@ -99,7 +101,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "run_inflation": found.run_inflation,
         "level_scatter": found.level_scatter,
         "scatter": {name: value for name, value in scatter.items() if value > 0.0},
-        "session_scatter": {name: value for name, value in session.items() if value > 0.0}, "label_scatter": labels,
+        "session_scatter": {name: value for name, value in session.items() if value > 0.0}, **usual,
         "noise_gain": found.noise_gain, "form": form,
         "input_shares": dict(declared.input_shares),
         "operating_points": [list(one) for one in declared.operating_points],
@@ -138,7 +140,7 @@ def plain(found: Identified) -> dict[str, Any]:
         "operating_points": {"count": len(found.vehicle.declared.operating_points), "scatter": _operating(found)},
         "gap": {"before": gap_row(names, found.before), "after": gap_row(names, found.after)},
         "horizon_s": found.observer.horizon,
-        "handed_out": "identified" if found.better else "file",
+        "channel_ratio": found.channel_ratio, "handed_out": "identified" if found.better else "file",
         "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes, *shown],
     }  # fmt: skip
 

@@ -9,10 +9,9 @@ from glider.tools.inference.pooled import (
     Parabola,
     Pooled,
     learn_scatter,
-    log_prior,
     marginalised,
-    without,
 )
+from glider.tools.own.decision import UsualLabels
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import (
     FORM,
@@ -24,12 +23,11 @@ from glider.tools.own.effects import (
     noise_effects,
     pushes,
     standard_effects,
-    unexplained,
     usual_inputs,
 )
 from glider.tools.own.error_components import Components, Whitening, independence, learn_components, patterns
 from glider.tools.own.excess_noise import NOISE_SIZES, responses, usual_gains
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, expand, inflation
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, inflation
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.measure import channel_rms, total_rms
 from glider.tools.own.noise_levels import fit_levels
@@ -41,7 +39,6 @@ from glider.tools.own.runs import OwnRun
 from glider.tools.own.runs_fit import (
     LEAST_SCALE,
     MIN_SCATTER_RUNS,
-    SCATTERS,
     USUAL_OWN_SCATTER,
     USUAL_SCATTER,
     RunsFit,
@@ -49,10 +46,9 @@ from glider.tools.own.runs_fit import (
     left_out,
     level_scatter,
 )
-from glider.tools.own.usual_effects import with_usual_effects
+from glider.tools.own.usual_effects import usual_labels, with_usual_effects
 
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
-USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
 
 
@@ -67,7 +63,7 @@ class Identified:
     covariance: np.ndarray
     scatter: np.ndarray  # (nuisance,) spreads, from run to run
     labels: list[Effect]
-    label_scatter: np.ndarray  # (labels,) spreads, each alone, beside what runs differ by
+    usual: UsualLabels
     eta: float
     run_inflation: float  # of the variance of shared values by the likelihood of runs
     errors: ChannelErrors  # what healthy runs leave
@@ -84,9 +80,17 @@ class Identified:
     notes: list[str] = field(default_factory=list)
 
     @property
+    def channel_ratio(self) -> float:
+        """Gaps of runs left out over those of the file's model, geometric mean of channels: what the likelihood of
+        errors goes by where the variance of each channel is unknown."""
+        after, before = (np.maximum(channel_rms(one), LEAST_SCALE) for one in (self.after, self.before))
+        return float(np.exp(np.nanmean(np.log(after / before))))
+
+    @property
     def better(self) -> bool:
-        """Whether runs left out are predicted no worse than by the file."""
-        return total_rms(self.after) <= total_rms(self.before)
+        """Whether runs left out are predicted no worse than by the file: a channel that neither predicts, and that
+        outweighs the others, decides nothing."""
+        return self.channel_ratio <= 1.0
 
     @property
     def handed_out(self) -> tuple[np.ndarray, np.ndarray]:
@@ -180,11 +184,11 @@ def identify(
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     after = fit.held_out(every, others)
-    labels, label_scatter = _label_scatter(observer, nuisance, own, others, scatter, eta, errors)
+    labels, usual_of_labels = usual_labels(replace(fit, scatter=scatter), others, eta)
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon, errors)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
-    return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, label_scatter, eta, between,
+    return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, usual_of_labels, eta, between,
                       errors, components, own, before, after, level_scatter(found), len(sessions), session_scatter,
                       operating_scatter, noise_gain, [one.label for one in added], notes)  # fmt: skip
 
@@ -230,36 +234,6 @@ def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> 
     return max(1.0, float(np.median(ratio)))
 
 
-def _label_scatter(observer, nuisance, own, others, scatter, eta, errors) -> tuple[list[Effect], np.ndarray]:
-    """How far each label alone differs from run to run beside the numbers of runs: what healthy runs show of it.
-
-    Every run is seen as one that is asked about later: by a vehicle identified from the others, as certain as these
-    make it. 1 sigma (labels,) in spreads, by the largest of its marginal likelihood with the prior of `learn_scatter`
-    for what it does in tolerances, so that labels that act alike differ alike, in whatever unit.
-    """
-    labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
-    labels += unexplained(observer.declared, observer.runs)
-    every = [*labels, *form_errors(observer.declared)]
-    into = placed(nuisance, every)
-    about = []
-    for n, without_it in enumerate(others):
-        variances, axes = np.linalg.eigh(without_it.covariance())
-        known, root = into @ without_it.mean(), into @ (axes * np.sqrt(np.maximum(variances, 0.0)))
-        one = expand(observer, n, every, into @ own[n], errors, observer.horizon).tempered(eta)
-        one = marginalised(replace(one, at=one.at - known), into @ scatter)
-        about.append(without(one, root))
-    slopes = np.array([-one.offset for one in about])[:, : len(labels)]
-    precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
-    reach = np.sqrt(np.mean([one.reach for one in about], axis=0))[: len(labels)]
-    reach = np.maximum(reach, USUAL_LABEL / USUAL_OWN_SCATTER)
-    scatters = SCATTERS[:, None] / reach  # (grid, labels) spreads
-    total = 1.0 + scatters[:, None] ** 2 * precisions  # (grid, runs, labels)
-    nat = 0.5 * (slopes**2 * scatters[:, None] ** 2 / total - np.log(total)).sum(axis=1)
-    usual = USUAL_LABEL if len(own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_LABEL
-    prior = log_prior(SCATTERS[:, None] ** 2, usual**2)
-    return labels, scatters[np.argmax(nat + prior, axis=0), np.arange(len(labels))]
-
-
 def learn_sessions(
     found: Sequence[Expansion], V: np.ndarray, scatter: np.ndarray, counts: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -278,13 +252,3 @@ def in_sessions(found: Sequence[Expansion], scatter: np.ndarray, counts: Sequenc
     runs, ends = [marginalised(one, scatter) for one in found], np.cumsum(counts)
     return [Pooled.of(runs[end - count : end], np.zeros(0)).parabola()
             for count, end in zip(counts, ends, strict=True)]  # fmt: skip
-
-
-def placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
-    """(effects, nuisance): what values of the nuisance are in the spreads of all effects."""
-    labels = [one.label for one in effects]
-    found = np.zeros((len(effects), len(nuisance)))
-    for k, one in enumerate(nuisance):
-        place = labels.index(one.label)
-        found[place, k] = one.spread / effects[place].spread
-    return found

@@ -9,15 +9,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
 
-from glider.tools.inference.pooled import Pooled, marginalised
-from glider.tools.own.decision import log_odds
-from glider.tools.own.effects import PARAMETER, Effect, standard_effects
+from glider.tools.inference.pooled import Pooled, log_prior, marginalised, without
+from glider.tools.own.decision import SIZES, UsualLabels, log_odds
+from glider.tools.own.effects import PARAMETER, Effect, form_errors, standard_effects, unexplained
 from glider.tools.own.hierarchy import LEAST_REACH, RunLevel, expand, inflation
 from glider.tools.own.measure import total_rms
 from glider.tools.own.posterior import MOST_EFFECTS, alone, size_evidence
-from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, RunsFit, left_out
+from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, SCATTERS, USUAL_OWN_SCATTER, RunsFit, left_out
 
+USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads
 MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and how long, before one is chosen
 
 
@@ -133,3 +136,57 @@ def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float
     odds = dict(zip(labels, log_odds_of(new), strict=True))
     odds |= {one: float(log_odds_of(np.array([fit.nuisance.index(one)]))[0]) for one in added}
     return odds, eta
+
+
+def usual_labels(fit: RunsFit, others: Sequence[Pooled], eta: float) -> tuple[list[Effect], UsualLabels]:
+    """Every label, and what healthy runs show of each alone beside the numbers of runs: what all have, and what each.
+
+    others: of each run what the others say (`left_out`); eta: how many errors are the same one. Every run is seen as
+    one that is asked about later: by a vehicle identified from the others, as certain as these make it. How runs
+    differ is where the marginal likelihood is largest, with the prior of `learn_scatter` for what it does in
+    tolerances, so that labels that act alike differ alike, in whatever unit. That all have some of a label is as
+    probable as not before, as where labels are added to the vehicle; sizes are a change's.
+    """
+    observer = fit.observer
+    labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
+    labels += unexplained(observer.declared, observer.runs)
+    every = [*labels, *form_errors(observer.declared)]
+    into = _placed(fit.nuisance, every)
+    about = []
+    for n, without_it in enumerate(others):
+        variances, axes = np.linalg.eigh(without_it.covariance())
+        known, root = into @ without_it.mean(), into @ (axes * np.sqrt(np.maximum(variances, 0.0)))
+        one = expand(observer, n, every, into @ fit.own[n], fit.errors, observer.horizon).tempered(eta)
+        one = marginalised(replace(one, at=one.at - known), into @ fit.scatter)
+        about.append(without(one, root))
+    slopes = np.array([-one.offset for one in about])[:, : len(labels)]
+    precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
+    reach = np.sqrt(np.mean([one.reach for one in about], axis=0))[: len(labels)]
+    reach = np.maximum(reach, USUAL_LABEL / USUAL_OWN_SCATTER)
+    scatters = SCATTERS[:, None] / reach  # (grid, labels) spreads
+    total = 1.0 + scatters[:, None] ** 2 * precisions  # (grid, runs, labels)
+    nat = 0.5 * (slopes**2 * scatters[:, None] ** 2 / total - np.log(total)).sum(axis=1)
+    usual = USUAL_LABEL if len(fit.own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_LABEL
+    nat += log_prior(SCATTERS[:, None] ** 2, usual**2)
+    # what all have, one size after another, and none
+    slope, precision = (slopes / total).sum(axis=1), (precisions / total).sum(axis=1)
+    tau2 = (SIZES[:, None, None] / reach) ** 2
+    variance = tau2 / (1.0 + tau2 * precision)  # (sizes, grid, labels)
+    mean = variance * slope
+    gain = 0.5 * (slope * mean + np.log(variance / tau2)) + np.array([log_odds(one) for one in labels])
+    gain += np.where([one.one_sided for one in labels], np.log(2.0) + norm.logcdf(mean / np.sqrt(variance)), 0.0)
+    gain = np.concatenate([np.zeros((1, *nat.shape)), gain - np.log(len(SIZES) * len(labels))])
+    best = np.argmax(nat + logsumexp(gain, axis=0), axis=0), np.arange(len(labels))
+    weights = np.exp(gain - logsumexp(gain, axis=0))[1:]
+    first, second = (weights * mean).sum(axis=0)[best], (weights * (variance + mean**2)).sum(axis=0)[best]
+    return labels, UsualLabels(scatters[best], first, np.sqrt(np.maximum(second - first**2, 0.0)))
+
+
+def _placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:
+    """(effects, nuisance): what values of the nuisance are in the spreads of all effects."""
+    labels = [one.label for one in effects]
+    found = np.zeros((len(effects), len(nuisance)))
+    for k, one in enumerate(nuisance):
+        place = labels.index(one.label)
+        found[place, k] = one.spread / effects[place].spread
+    return found

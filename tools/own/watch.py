@@ -245,9 +245,7 @@ class Watch(WatchedRuns):
             evidence += float((slope[0] - precision[0, 0] * at.size) * at.size)
             nat, mean, sd = size_posterior(precision[0, :1] * at.size, precision[:1, :1], d[:, :1], effect.one_sided)
         mean = float(np.clip(mean, self.low[k], self.high[k]))
-        usual, _ = usual_share(
-            healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0], self.moved_by_events(span)
-        )
+        usual = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0], self.moved_by_events(span))
         prior = self.span_prior(*span, at.sessions) - np.log(self.named) + log_odds(effect)
         score = evidence + nat - log_evidence(self.pooled(self.sessions)) - usual + prior
         event = Event({}, *span, effect.label, mean, sd, 0.0)

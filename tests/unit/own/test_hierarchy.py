@@ -15,9 +15,11 @@ from glider.tools.own.decision import (
     Deviations,
     Healthy,
     Hypothesis,
+    UsualLabels,
     decide,
     log_prior,
     usual_share,
+    with_usual,
 )
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
@@ -48,10 +50,16 @@ class Columns:
         self.runs = [None] * runs
 
 
+def usually(scatter: float = 0.0, mean: float = 0.0) -> UsualLabels:
+    """Of the first label."""
+    first = np.array([1.0, 0.0, 0.0])
+    return UsualLabels(scatter * first, mean * first, np.zeros(3))
+
+
 def healthy(**changes) -> Healthy:
     errors = ChannelErrors(np.ones(1), np.ones(1))
     one = Healthy(LABELS, np.zeros((3, 3)), np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.7]),
-                  np.zeros(3), errors, 1.0, 10, 0.5)  # fmt: skip
+                  usually(), errors, 1.0, 10, 0.5)  # fmt: skip
     return replace(one, **changes)
 
 
@@ -131,15 +139,49 @@ def test_a_label_alone_gains_what_its_evidence_says():
 
 @pytest.mark.parametrize(("usual", "least", "most"), [(0.0, 0.0, 0.0), (0.05, 1.0, 12.0), (3.0, 15.0, 1e3)])
 def test_what_healthy_runs_show_of_a_label_is_no_evidence_of_a_change(usual, least, most):
-    asked = engine(4, usual=np.array([usual, 0.0, 0.0]))
-    assert least <= usual_share(asked.healthy, 0, float(asked.reach[0]), 0.5, 0.08, 4)[0] <= most
+    asked = engine(4, usual=usually(usual))
+    assert least <= usual_share(asked.healthy, 0, float(asked.reach[0]), 0.5, 0.08, 4) <= most
+
+
+@pytest.mark.parametrize(("mean", "least", "most"), [(0.5, 18.0, 20.0), (0.45, 17.0, 19.0), (-0.5, 0.0, 0.0)])
+def test_what_all_healthy_runs_show_of_a_label_is_no_change_but_the_opposite_is(mean, least, most):
+    """A label of 0.5 tolerances, 0.08 known: some 18 nat."""
+    asked = engine(4, usual=usually(0.02, mean))
+    assert least <= usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4) <= most
+
+
+def test_of_a_label_that_gains_little_no_more_is_usual():
+    asked = engine(4, usual=usually(3.0))
+    assert usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, gain=5.0) == pytest.approx(5.0, abs=2.5)
+    assert usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, gain=-5.0) == 0.0
+
+
+def test_two_labels_that_healthy_runs_show_are_no_change():
+    """Both in their usual place: no change says as much as both; one of them beside what is not usual says nothing."""
+    both = healthy(usual=UsualLabels(np.full(3, 0.02), np.array([0.5, 0.4, 0.0]), np.zeros(3)))
+
+    def at(labels, gain, sizes) -> Hypothesis:
+        return Hypothesis(labels, gain + log_prior(both, labels), np.array(sizes), np.full(len(sizes), 0.08),
+                          np.zeros(3), np.zeros((4, 3)), np.ones(4))  # fmt: skip
+
+    every = [
+        at((), 0.0, []),
+        at(("gain",), 18.0, [0.5]),
+        at(("mass",), 11.0, [0.4]),
+        at(("gain", "mass"), 29.0, [0.5, 0.4]),
+    ]
+    none, *_, pair = with_usual(every, both, np.ones(3), 4)
+    assert none > pair
+    beyond = [*every[:2], at(("mass",), 61.0, [1.0]), at(("gain", "mass"), 79.0, [0.5, 1.0])]
+    none, gain, mass, pair = with_usual(beyond, both, np.ones(3), 4)
+    assert mass > max(none, gain, pair)
 
 
 @pytest.mark.parametrize(("moved", "least", "most"), [(0.0, 0.0, 0.0), (0.25, 1.0, 12.0), (100.0, 15.0, 1e3)])
 def test_what_the_form_of_an_effect_lacks_is_no_evidence_of_another_beside_it(moved, least, most):
     """A label of 0.5 tolerances beside effects of mean square `moved`, whose form is 0.2 of them off."""
     asked = engine(4)
-    assert least <= usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, moved)[0] <= most
+    assert least <= usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, moved) <= most
 
 
 def test_of_a_label_a_force_may_be_that_its_equations_do_not_have():
@@ -226,7 +268,7 @@ def test_runs_that_differ_by_more_than_they_say_count_for_less(excess):
 @pytest.mark.parametrize(("gain", "size", "first"), [(2300.0, 3.0, "gain"), (2.0, 0.015, "none")], ids=["far", "usual"])
 def test_a_label_far_from_what_is_usual_is_not_lost_to_another(gain, size, first):
     """0.03 spreads are usual of the first label, known to 0.005; it gains what that says, the second half of it."""
-    one = healthy(usual=np.array([0.03, 0.0, 0.0]))
+    one = healthy(usual=usually(0.03))
 
     def fitted(labels: tuple[str, ...], nat: float, sizes: list[float]) -> Hypothesis:
         known = np.array(sizes)

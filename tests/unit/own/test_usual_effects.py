@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from glider.tools.own import usual_effects
 from glider.tools.own.check import load_own
 from glider.tools.own.diagnose import diagnose_own
 from glider.tools.own.identified import plain, write
@@ -89,3 +90,19 @@ def test_written_and_read_it_flies_and_asks_beside_that(late, folder):
 def test_a_vehicle_as_the_model_has_it_has_none(folder):
     found = identify(load_own(folder / "turner.toml"), [runs(module_of(folder / "turner.py"), 4, 0.0)])
     assert found.effects == []
+
+
+def test_what_is_not_taken_into_the_vehicle_is_usual_all_the_same(folder, monkeypatch):
+    """No label joins the vehicle here: three runs of its motor, late as ever, are no change; another damping is one."""
+    monkeypatch.setattr(usual_effects, "MOST_EFFECTS", 0)
+    model = module_of(folder / "turner.py")
+    found = identify(load_own(folder / "turner.toml"), [runs(model, 3, LAG)])
+    assert found.effects == []
+    write(found, folder / "without")
+    vehicle = load_own(folder / "without" / "identified.toml")
+    table = vehicle.file.identified
+    assert table is not None
+    assert table.label_mean["motor_lag"] == pytest.approx(LAG, abs=0.2)
+    for seed, damping, cause in ((11, TRUE["damping"], "none"), (14, TRUE["damping"], "none"), (12, 0.7, "damping")):
+        chances = diagnose_own(vehicle, runs(model, seed, LAG, 3, damping))[0].chances
+        assert chances[cause] > 0.5, chances
