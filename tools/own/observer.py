@@ -55,6 +55,7 @@ class Observer:
     notes: list[str] = field(default_factory=list)
     _begun: dict[tuple[int, int, bytes, bytes], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _windows: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    _time_constant: float | None = None  # s, once it is asked for
     _first: dict[tuple[int, bytes], dict[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -378,15 +379,17 @@ class Observer:
 
     @property
     def horizon(self) -> float:
-        """Of windows, s: the file's, or some of the model's slowest time constants."""
-        if self.declared.horizon is None:
-            return float(np.clip(TIME_CONSTANTS * self._slowest(), *HORIZON))
-        return float(self.declared.horizon)
+        """Of windows, s: the file's, or some of the model's slowest time constants, the median of runs."""
+        if self.declared.horizon is not None:
+            return float(self.declared.horizon)
+        if self._time_constant is None:
+            self._time_constant = float(np.median([self._slowest(n) for n in range(len(self.runs))]))
+        return float(np.clip(TIME_CONSTANTS * self._time_constant, *HORIZON))
 
-    def _slowest(self) -> float:
-        """Slowest decay of the model about a recorded state, s; what does not decay is left aside."""
-        kernels, run = self.vehicle.kernels, self.runs[0]
-        x = self.filter(0, self.point).states[run.t.searchsorted(run.t[0] + 2.0, side="right") - 1, : len(self.kinds)]
+    def _slowest(self, n: int) -> float:
+        """Slowest decay of the model about a state of run n, s; what does not decay is left aside."""
+        kernels, run = self.vehicle.kernels, self.runs[n]
+        x = self.filter(n, self.point).states[run.t.searchsorted(run.t[0] + 2.0, side="right") - 1, : len(self.kinds)]
         dt, w = float(np.median(np.diff(run.t))), np.zeros(len(self.declared.noises))
         base = names.normalised(
             np.array(kernels.advance(x, run.inputs[0], w, self.point.theta, dt, self.parts)), self.kinds

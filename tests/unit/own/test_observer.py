@@ -195,3 +195,18 @@ def test_a_vehicle_whose_file_leaves_nothing_open_is_watched_and_diagnosed(tmp_p
     assert len(watch(vehicle, runs).plain()["runs"]) > 0
     found, _ = diagnose_own(vehicle, runs[:2])
     assert sum(found.chances.values()) == pytest.approx(1.0)
+
+
+def test_windows_without_a_length_are_of_all_runs_time_constants_in_whatever_order(tmp_path, monkeypatch):
+    """Quadratic damping: the faster a run, the faster it decays."""
+    monkeypatch.setenv("GLIDER_OWN_PYTHON", "1")
+    (tmp_path / "fast.py").write_text(LINEAR.replace("theta[0] * x[1]", "theta[0] * abs(x[1]) * x[1]"))
+    (tmp_path / "fast.toml").write_text('format = 1\nmodel = "fast"\n')
+    vehicle, t = load_own(tmp_path / "fast.toml"), np.arange(0.0, 12.0, 0.1)
+    runs = [OwnRun(str(push), t, np.full((len(t), 1), 2.0 * push), (0.6 * push**0.5 * t)[:, None], None)
+            for push in (0.02, 0.5, 1.0)]  # fmt: skip
+    seconds = [observer_of(vehicle, [runs[n] for n in order]).horizon for order in ((0, 1, 2), (2, 1, 0), (1, 2, 0))]
+    assert seconds == pytest.approx([seconds[0]] * 3)
+    each = [observer_of(vehicle, [run]).horizon for run in runs]
+    assert each[2] < each[1] < each[0]
+    assert seconds[0] == pytest.approx(each[1], rel=0.01)
