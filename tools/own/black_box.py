@@ -8,8 +8,9 @@ from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
 from glider.tools.own.effects import ModelPoint, driven_inputs
 from glider.tools.own.load import called
-from glider.tools.own.observer import HORIZON, WARM_UP, WARM_UP_SHARE, Filtered, Observer
+from glider.tools.own.observer import WARM_UP, WARM_UP_SHARE, Filtered, Observer
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.steps import HORIZON
 from glider.tools.own.trends import Trend, trend_of
 
 

@@ -15,11 +15,9 @@ from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLER
 from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs, nominal_point
 from glider.tools.own.load import LoadedVehicle, called, user_error
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.steps import HORIZON, TIME_CONSTANTS, choose_parts, time_constant
 
-FIRST_SECONDS = 1.0  # of a run, over which the rate of an output at its start is taken
-PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which steps and half steps may differ
-HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
-TIME_CONSTANTS = 3.0  # in a window
+FIRST_SECONDS, FIRST_READINGS = 1.0, 3  # over which the rate of an output at a run's start is taken, at least
 WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
 NOTHING = np.zeros(0)
 NO_POINT = ModelPoint(
@@ -94,17 +92,18 @@ class Observer:
         if key in self._first:
             return dict(self._first[key])
         found: dict[str, float] = {}
-        early = run.t - run.t[0] <= FIRST_SECONDS
+        early = int(np.searchsorted(run.t, run.t[0] + FIRST_SECONDS, side="right"))
         for k, one in enumerate(self.declared.outputs):
             gain, bias = point.reading[0, k], point.reading[1, k]
-            seen = np.flatnonzero(np.isfinite(run.outputs[:, k]) & early & (gain != 0.0))
-            values = (run.outputs[seen, k] - bias) / gain
+            read = np.flatnonzero(np.isfinite(run.outputs[:, k]))
+            seen = read[: max(FIRST_READINGS, int(np.searchsorted(read, early)))]
+            values = (run.outputs[seen, k] - bias) / (gain or 1.0)  # a dead sensor is of no use: as it reads
             if one.angle:
                 values = np.unwrap(values)
             known = self.declared.start.get(one.name)
             found[one.name] = known[0] if known else (float(values[0]) if len(seen) else np.nan)
             when = run.t[seen] - run.t[0]
-            sloped = len(seen) >= 3 and np.ptp(when) > 0.0
+            sloped = len(seen) >= FIRST_READINGS and np.ptp(when) > 0.0
             found[f"{one.name}_rate"] = float(np.polyfit(when, values, 1)[0]) if sloped else np.nan
         if len(self._first) < MOST_KEPT:
             self._first[key] = dict(found)
@@ -160,6 +159,9 @@ class Observer:
             P = P - np.outer(across, across) / total
         return x, 0.5 * (P + P.T)
 
+    def _choose_parts(self) -> None:
+        choose_parts(self)
+
     def _choose_starts(self) -> None:
         """Of models with several initial states, that which explains a run best."""
         if not hasattr(self.vehicle.model, "initial"):
@@ -174,38 +176,6 @@ class Observer:
                 values.append(self.filter(n, self.point).value)
             self.starts[n] = int(np.argmin(values))
 
-    # how fine a step is
-
-    def _choose_parts(self) -> None:
-        """Steps in which a row's step is taken: doubled until a step and two halves of it agree."""
-        kernels, worst = self.vehicle.kernels, 1
-        for n, run in enumerate(self.runs[:8]):
-            x, _ = self.start(n, self.point)
-            u, dt, w = run.inputs[0], float(np.median(np.diff(run.t))), np.zeros(len(self.declared.noises))
-            parts = worst
-            while parts < MOST_PARTS:
-                ends = []
-                for count in (parts, 2 * parts):
-                    end = x
-                    for _ in range(20):
-                        end = kernels.advance(end, u, w, self.point.theta, dt, count)
-                        end = names.normalised(np.array(end), self.kinds)
-                    ends.append(end)
-                error = np.zeros(len(self.scales))
-                names.minus(ends[0], ends[1], self.kinds, error)
-                if np.isfinite(error).all() and np.abs(error / self.scales).max() < PARTS_TOLERANCE:
-                    break
-                parts *= 2
-            worst = max(worst, parts)
-        if worst >= MOST_PARTS:
-            raise InputError(
-                f"the model is stiff: {MOST_PARTS} parts of a step of {dt:.3g} s do not agree with {2 * MOST_PARTS}; "
-                "declare slower states, or solve its fast ones inside step", source=self.vehicle.source,
-            )  # fmt: skip
-        self.parts = worst
-        if worst > 1:
-            self.notes.append(f"the model is stiff for the rows' step: every step is taken in {worst} parts")
-
     # likelihood
 
     def filter(self, n: int, point: ModelPoint, covariances: bool = False) -> Filtered:
@@ -215,15 +185,16 @@ class Observer:
         m, n_o = len(self.scales) + 2 * len(point.ports), point.own.shape[1]
         x, P = self.start(n, point)
         full = m + n_o
-        keep = (np.zeros((rows, full, n_y)), np.zeros((rows, len(declared.states) + n_o)),
+        keep = (np.zeros((rows, full, n_y)), np.full((rows, len(declared.states) + n_o), np.nan),
                 np.zeros((rows if covariances else 0, full, full)))  # fmt: skip
         try:
             driven = driven_inputs(run, declared, point)
-            value, squares, samples = kernels.filter_run(
-                run.t, held_inputs(declared, driven), run.outputs, x, P, point.theta, point.own, point.reading,
-                forces(declared, point, run.t, driven), point.density, point.variance, point.ports, self.kinds,
-                self.scales, self.angles, self.parts, keep,
-            )  # fmt: skip
+            with np.errstate(all="ignore"):
+                value, squares, samples = kernels.filter_run(
+                    run.t, held_inputs(declared, driven), run.outputs, x, P, point.theta, point.own, point.reading,
+                    forces(declared, point, run.t, driven), point.density, point.variance, point.ports, self.kinds,
+                    self.scales, self.angles, self.parts, keep,
+                )  # fmt: skip
         except np.linalg.LinAlgError:
             value, squares, samples = np.inf, np.inf, 1
         except (ArithmeticError, ValueError, TypeError, IndexError) as error:
@@ -277,7 +248,9 @@ class Observer:
         run, kernels = self.runs[n], self.vehicle.kernels
         starts, ends = self.windows(n, horizon)
         out, driven = np.full(run.outputs.shape, np.nan), driven_inputs(run, self.declared, point)
-        if np.isfinite(states[starts]).all():
+        found = np.isfinite(states[starts]).all(axis=1)
+        starts, ends = starts[found], ends[found]
+        if len(starts):
             with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
                 kernels.fly_run(
                     run.t, held_inputs(self.declared, driven), starts, ends, states[starts], point.theta, point.own,
@@ -303,7 +276,8 @@ class Observer:
                     error[seen, k] = np.unwrap(error[seen, k])
         lost = np.isnan(predicted[rows]).all(axis=1)
         error[lost] = np.where(np.isnan(self.runs[n].outputs[rows[lost]]), np.nan, LOST * self.tolerances)
-        return np.clip(error / self.tolerances, -LOST, LOST)
+        with np.errstate(over="ignore"):
+            return np.clip(error / self.tolerances, -LOST, LOST)
 
     def predicted(self, n: int) -> np.ndarray:
         """Run n by the vehicle's own model, (rows, outputs): windows one after the other; what none covers is read.
@@ -383,28 +357,8 @@ class Observer:
         if self.declared.horizon is not None:
             return float(self.declared.horizon)
         if self._time_constant is None:
-            self._time_constant = float(np.median([self._slowest(n) for n in range(len(self.runs))]))
+            self._time_constant = float(np.median([time_constant(self, n) for n in range(len(self.runs))]))
         return float(np.clip(TIME_CONSTANTS * self._time_constant, *HORIZON))
-
-    def _slowest(self, n: int) -> float:
-        """Slowest decay of the model about a state of run n, s; what does not decay is left aside."""
-        kernels, run = self.vehicle.kernels, self.runs[n]
-        x = self.filter(n, self.point).states[run.t.searchsorted(run.t[0] + 2.0, side="right") - 1, : len(self.kinds)]
-        dt, w = float(np.median(np.diff(run.t))), np.zeros(len(self.declared.noises))
-        base = names.normalised(
-            np.array(kernels.advance(x, run.inputs[0], w, self.point.theta, dt, self.parts)), self.kinds
-        )
-        m = len(self.scales)
-        F, column = np.zeros((m, m)), np.zeros(m)
-        for j in range(m):
-            d = np.zeros(m)
-            d[j] = names.DIFFERENCE_STEP * self.scales[j]
-            end = kernels.advance(names.plus(x, d, self.kinds), run.inputs[0], w, self.point.theta, dt, self.parts)
-            names.minus(names.normalised(np.array(end), self.kinds), base, self.kinds, column)
-            F[:, j] = column / d[j]
-        size = np.abs(np.linalg.eigvals(F)) if np.isfinite(F).all() else np.zeros(0)
-        decaying = size[(size < 1.0 - 1e-4) & (size > 0.0)]
-        return float(np.max(-dt / np.log(decaying))) if len(decaying) else HORIZON[1] / TIME_CONSTANTS
 
 
 def state_kinds(declared: Declaration) -> list[int]:

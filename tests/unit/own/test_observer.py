@@ -210,3 +210,69 @@ def test_windows_without_a_length_are_of_all_runs_time_constants_in_whatever_ord
     each = [observer_of(vehicle, [run]).horizon for run in runs]
     assert each[2] < each[1] < each[0]
     assert seconds[0] == pytest.approx(each[1], rel=0.01)
+
+
+STIFF = """
+import numpy as np
+inputs = {"push": "N"}
+outputs = [("place", "m", "place_m", 0.1)]
+parameters = [("damping", "1/m", 30.0, 5.0)]
+states = [("x", "m"), ("v", "m/s")]
+noises = [("shove", "m/s2", 0.05)]
+def derivative(x, u, w, theta):
+    return np.array([x[1], u[0] - theta[0] * abs(x[1]) * x[1] + w[0]])
+def measure(x, u, theta):
+    return np.array([x[0]])
+"""
+
+
+def sped(vehicle) -> OwnRun:
+    """At rest, then pushed to half a metre a second, a row each second; flown in small steps."""
+    t, x, places = np.arange(0.0, 20.0, 1.0), np.zeros(2), []
+    push = np.where(t < 3.0, 0.0, 7.5)[:, None]
+    for row in range(len(t)):
+        places.append(x[0])
+        for _ in range(200):
+            x = x + 0.005 * np.asarray(vehicle.model.derivative(x, push[row], np.zeros(1), np.array([30.0])))
+    return OwnRun("run7", t, push, np.array(places)[:, None], None)
+
+
+def test_a_model_that_is_stiff_only_at_speed_is_flown_in_smaller_steps(tmp_path, monkeypatch):
+    monkeypatch.setenv("GLIDER_OWN_PYTHON", "1")
+    (tmp_path / "stiff.py").write_text(STIFF)
+    (tmp_path / "stiff.toml").write_text('format = 1\nmodel = "stiff"\n[windows]\nseconds = 10.0\n')
+    vehicle = load_own(tmp_path / "stiff.toml")
+    found = observer_of(vehicle, [sped(vehicle)])
+    assert found.parts > 1
+    assert any("stiff" in note for note in found.notes)
+    assert found.gaps(0, found.point, 10.0)[0] < 0.5
+
+
+def test_a_filter_that_is_lost_is_said_to_be_and_its_windows_count_as_lost(tmp_path, monkeypatch):
+    """The model has no answer beyond 2 m: windows before are flown, those behind are lost."""
+    monkeypatch.setenv("GLIDER_OWN_PYTHON", "1")
+    (tmp_path / "whole.py").write_text(STIFF)
+    (tmp_path / "whole.toml").write_text('format = 1\nmodel = "whole"\n')
+    (tmp_path / "edge.py").write_text(STIFF.replace("u[0] -", "u[0] + 0.0 * float(np.log(max(2.0 - x[0], 0.0))) -"))
+    (tmp_path / "edge.toml").write_text('format = 1\nmodel = "edge"\n[windows]\nseconds = 4.0\n')
+    found = observer_of(load_own(tmp_path / "edge.toml"), [sped(load_own(tmp_path / "whole.toml"))])
+    assert any(note.startswith("run7: the filter is lost ") for note in found.notes), found.notes
+    errors = np.abs(found.errors(0, found.predict(0, found.point, 4.0, found.filter(0, found.point).states), 4.0))
+    assert errors[0] < 1.0
+    assert errors[-1] == 100.0
+
+
+def test_a_sensor_that_reads_seldom_says_all_the_same_how_a_run_begins(linear):
+    """Every 4 s, the first time after 8 s: its first readings and their slope, not NaN."""
+    vehicle, run = linear
+    y = np.where((np.arange(len(run.t)) % 40 == 0) & (run.t > 7.0), 1.0 + 0.1 * run.t, np.nan)[:, None]
+    longer = replace(run, t=4.0 * run.t, outputs=y)
+    readings = observer_of(vehicle, [longer]).first_readings(0, nominal_point(vehicle.declared))
+    assert readings["place"] == pytest.approx(1.8)
+    assert np.isnan(readings["place_rate"])  # two readings
+    more = replace(
+        longer, outputs=np.where(np.arange(len(run.t))[:, None] % 20 == 0, 1.0 + 0.1 * run.t[:, None], np.nan)
+    )
+    assert observer_of(vehicle, [more]).first_readings(0, nominal_point(vehicle.declared))[
+        "place_rate"
+    ] == pytest.approx(0.025)

@@ -1,0 +1,106 @@
+"""How fine the steps of a user's model have to be, how slow the model is, and whether its filter follows a run."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from glider.tools.data.errors import InputError
+from glider.tools.own import kernels as names
+
+if TYPE_CHECKING:
+    from glider.tools.own.observer import Observer
+
+STEPS_AT_START, TRIED_RUNS, STATES_TRIED = 20, 8, 20  # by which how fine a step has to be is found
+HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
+TIME_CONSTANTS = 3.0  # in a window
+PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which steps and half steps may differ
+
+
+def choose_parts(observer: "Observer") -> None:
+    """Steps in which a row's step is taken: doubled until a step and two halves of it agree where runs begin, and
+    at most states that they pass through; a filter that is lost may be so by its steps."""
+    tried = range(min(len(observer.runs), TRIED_RUNS))
+    for n in tried:
+        x, _ = observer.start(n, observer.point)
+        while _halves_differ(observer, n, x, 0, STEPS_AT_START) >= PARTS_TOLERANCE:
+            observer.parts *= 2
+            if observer.parts >= MOST_PARTS:
+                dt = float(np.median(np.diff(observer.runs[n].t)))
+                raise InputError(
+                    f"the model is stiff: {MOST_PARTS} parts of a step of {dt:.3g} s do not agree with "
+                    f"{2 * MOST_PARTS}; declare slower states, or solve its fast ones inside step",
+                    source=observer.vehicle.source,
+                )  # fmt: skip
+    enough = observer.parts
+    while _unsteady(observer, tried) and observer.parts < MOST_PARTS:
+        observer.parts *= 2
+    if observer.parts >= MOST_PARTS:  # smaller steps are no help
+        observer.parts = enough
+    observer.notes += [said for n in tried if (said := _lost(observer, n))]
+    if observer.parts > 1:
+        observer.notes.append(f"the model is stiff for the rows' step: every step is taken in {observer.parts} parts")
+
+
+def _halves_differ(observer: "Observer", n: int, x: np.ndarray, row: int, steps: int) -> float:
+    """By how much steps of a row and two halves of each differ at last, of a state's scale: the most of states."""
+    kernels, u, w = observer.vehicle.kernels, observer.runs[n].inputs[row], np.zeros(len(observer.declared.noises))
+    dt, ends, error = float(np.median(np.diff(observer.runs[n].t))), list[np.ndarray](), np.zeros(len(observer.scales))
+    for count in (observer.parts, 2 * observer.parts):
+        end = x
+        for _ in range(steps):
+            with np.errstate(all="ignore"):  # a model that diverges is far off
+                end = np.array(kernels.advance(end, u, w, observer.point.theta, dt, count))
+            end = names.normalised(end, observer.kinds)
+        ends.append(end)
+    names.minus(ends[0], ends[1], observer.kinds, error)
+    return float(np.abs(error / observer.scales).max()) if np.isfinite(error).all() else np.inf
+
+
+def _unsteady(observer: "Observer", tried: Iterable[int]) -> bool:
+    """Whether a filter is lost, or a step and its halves differ at most states of some runs."""
+    differ = list[float]()
+    for n in tried:
+        states = observer.filter(n, observer.point).states[:, : len(observer.kinds)]
+        if not np.isfinite(states).all():
+            return True
+        rows = np.linspace(0, len(states) - 2, STATES_TRIED).astype(int)
+        differ += [_halves_differ(observer, n, states[row], row, 1) for row in rows]
+    return float(np.median(differ)) >= PARTS_TOLERANCE
+
+
+def _lost(observer: "Observer", n: int) -> str:
+    """Where the filter of a run is lost, in words; empty: nowhere."""
+    states, run = observer.filter(n, observer.point).states[:, : len(observer.kinds)], observer.runs[n]
+    lost = np.flatnonzero(~np.isfinite(states).all(axis=1))
+    if not len(lost):
+        return ""
+    before = states[max(lost[0] - 1, 0)]
+    k = int(np.argmax(np.abs(before) / np.abs(states[: max(lost[0], 1)]).mean(axis=0).clip(1e-9)))
+    at = f"{run.t[lost[0]] - run.t[0]:.3g} s"
+    return f"{run.name}: the filter is lost {at} after the start, {observer.declared.states[k].name} at {before[k]:.3g}"
+
+
+def time_constant(observer: "Observer", n: int) -> float:
+    """Slowest decay of the model about a state of run n, s; what does not decay is left aside."""
+    kernels, run = observer.vehicle.kernels, observer.runs[n]
+    x = observer.filter(n, observer.point).states[
+        run.t.searchsorted(run.t[0] + 2.0, side="right") - 1, : len(observer.kinds)
+    ]
+    dt, w = float(np.median(np.diff(run.t))), np.zeros(len(observer.declared.noises))
+    base = names.normalised(
+        np.array(kernels.advance(x, run.inputs[0], w, observer.point.theta, dt, observer.parts)), observer.kinds
+    )
+    m = len(observer.scales)
+    F, column = np.zeros((m, m)), np.zeros(m)
+    for j in range(m):
+        d = np.zeros(m)
+        d[j] = names.DIFFERENCE_STEP * observer.scales[j]
+        end = kernels.advance(
+            names.plus(x, d, observer.kinds), run.inputs[0], w, observer.point.theta, dt, observer.parts
+        )
+        names.minus(names.normalised(np.array(end), observer.kinds), base, observer.kinds, column)
+        F[:, j] = column / d[j]
+    size = np.abs(np.linalg.eigvals(F)) if np.isfinite(F).all() else np.zeros(0)
+    decaying = size[(size < 1.0 - 1e-4) & (size > 0.0)]
+    return float(np.max(-dt / np.log(decaying))) if len(decaying) else HORIZON[1] / TIME_CONSTANTS
