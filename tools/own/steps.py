@@ -1,15 +1,16 @@
 """How fine the steps of a user's model have to be, how slow the model is, and whether its filter follows a run."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
-
-if TYPE_CHECKING:
-    from glider.tools.own.observer import Observer
+from glider.tools.own.declare import Declaration
+from glider.tools.own.effects import ModelPoint
+from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.runs import OwnRun
 
 STEPS_AT_START, TRIED_RUNS, STATES_TRIED = 20, 8, 20  # by which how fine a step has to be is found
 HORIZON = (5.0, 20.0)  # s: of windows, where the vehicle's time constants set it
@@ -17,7 +18,30 @@ TIME_CONSTANTS = 3.0  # in a window
 PARTS_TOLERANCE, MOST_PARTS = 0.02, 64  # of a state's scale a second, by which steps and half steps may differ
 
 
-def choose_parts(observer: "Observer") -> None:
+class Followed(Protocol):
+    """What a filter has found of a run."""
+
+    @property
+    def states(self) -> np.ndarray: ...  # (rows, n + o), NaN where it is lost
+
+
+class Flown(Protocol):
+    """What is asked of a vehicle's model along runs: an observer (observer.py)."""
+
+    vehicle: LoadedVehicle
+    declared: Declaration
+    runs: list[OwnRun]
+    point: ModelPoint
+    kinds: np.ndarray
+    scales: np.ndarray
+    parts: int
+    notes: list[str]
+
+    def start(self, n: int, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]: ...
+    def filter(self, n: int, point: ModelPoint) -> Followed: ...
+
+
+def choose_parts(observer: Flown) -> None:
     """Steps in which a row's step is taken: doubled until a step and two halves of it agree where runs begin, and
     at most states that they pass through; a filter that is lost may be so by its steps."""
     tried = range(min(len(observer.runs), TRIED_RUNS))
@@ -42,7 +66,7 @@ def choose_parts(observer: "Observer") -> None:
         observer.notes.append(f"the model is stiff for the rows' step: every step is taken in {observer.parts} parts")
 
 
-def _halves_differ(observer: "Observer", n: int, x: np.ndarray, row: int, steps: int) -> float:
+def _halves_differ(observer: Flown, n: int, x: np.ndarray, row: int, steps: int) -> float:
     """By how much steps of a row and two halves of each differ at last, of a state's scale: the most of states."""
     kernels, u, w = observer.vehicle.kernels, observer.runs[n].inputs[row], np.zeros(len(observer.declared.noises))
     dt, ends, error = float(np.median(np.diff(observer.runs[n].t))), list[np.ndarray](), np.zeros(len(observer.scales))
@@ -57,7 +81,7 @@ def _halves_differ(observer: "Observer", n: int, x: np.ndarray, row: int, steps:
     return float(np.abs(error / observer.scales).max()) if np.isfinite(error).all() else np.inf
 
 
-def _unsteady(observer: "Observer", tried: Iterable[int]) -> bool:
+def _unsteady(observer: Flown, tried: Iterable[int]) -> bool:
     """Whether a filter is lost, or a step and its halves differ at most states of some runs."""
     differ = list[float]()
     for n in tried:
@@ -69,7 +93,7 @@ def _unsteady(observer: "Observer", tried: Iterable[int]) -> bool:
     return float(np.median(differ)) >= PARTS_TOLERANCE
 
 
-def _lost(observer: "Observer", n: int) -> str:
+def _lost(observer: Flown, n: int) -> str:
     """Where the filter of a run is lost, in words; empty: nowhere."""
     states, run = observer.filter(n, observer.point).states[:, : len(observer.kinds)], observer.runs[n]
     lost = np.flatnonzero(~np.isfinite(states).all(axis=1))
@@ -81,7 +105,7 @@ def _lost(observer: "Observer", n: int) -> str:
     return f"{run.name}: the filter is lost {at} after the start, {observer.declared.states[k].name} at {before[k]:.3g}"
 
 
-def time_constant(observer: "Observer", n: int) -> float:
+def time_constant(observer: Flown, n: int) -> float:
     """Slowest decay of the model about a state of run n, s; what does not decay is left aside."""
     kernels, run = observer.vehicle.kernels, observer.runs[n]
     x = observer.filter(n, observer.point).states[
