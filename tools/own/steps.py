@@ -61,6 +61,8 @@ def choose_parts(observer: Flown) -> None:
         observer.parts *= 2
     if observer.parts >= MOST_PARTS:  # smaller steps are no help
         observer.parts = enough
+    elif observer.parts > 1:  # what is stable so at the file's numbers has to be so at others
+        observer.parts *= 2
     observer.notes += [said for n in tried if (said := _lost(observer, n))]
     if observer.parts > 1:
         observer.notes.append(f"the model is stiff for the rows' step: every step is taken in {observer.parts} parts")
@@ -82,7 +84,8 @@ def _halves_differ(observer: Flown, n: int, x: np.ndarray, row: int, steps: int)
 
 
 def _unsteady(observer: Flown, tried: Iterable[int]) -> bool:
-    """Whether a filter is lost, or a step and its halves differ at most states of some runs."""
+    """Whether a filter is lost, or a step and its halves differ at most states of some runs, or by a whole scale at
+    any."""
     differ = list[float]()
     for n in tried:
         states = observer.filter(n, observer.point).states[:, : len(observer.kinds)]
@@ -90,7 +93,7 @@ def _unsteady(observer: Flown, tried: Iterable[int]) -> bool:
             return True
         rows = np.linspace(0, len(states) - 2, STATES_TRIED).astype(int)
         differ += [_halves_differ(observer, n, states[row], row, 1) for row in rows]
-    return float(np.median(differ)) >= PARTS_TOLERANCE
+    return float(np.median(differ)) >= PARTS_TOLERANCE or max(differ) >= 1.0
 
 
 def _lost(observer: Flown, n: int) -> str:
