@@ -187,6 +187,7 @@ def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray,
             about = healthy, k, float(reach[k]), float(one.sizes[n]), float(one.sd[n]), runs
             gain = gained[own] - gained[own - {label}]
             usual = usual_share(*about, gain=gain)
+            # one that is worse by itself, but brings another, costs what it is worse by
             most[own - {label}] = max(most[own - {label}], most[own] + (usual if gain > 0.0 else gain))
             by_form[own] = max(by_form[own], usual_share(*about, float(moves.sum() - moves[n]), gain) - usual)
     return np.array([one.evidence + most[frozenset(one.labels)] - by_form[frozenset(one.labels)] for one in every])

@@ -1,6 +1,6 @@
 """How fine the steps of a user's model have to be, how slow the model is, and whether its filter follows a run."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -57,13 +57,15 @@ def choose_parts(observer: Flown) -> None:
                     source=observer.vehicle.source,
                 )  # fmt: skip
     enough = observer.parts
-    while _unsteady(observer, tried) and observer.parts < MOST_PARTS:
+    followed = [_states(observer, n) for n in tried]
+    while _unsteady(observer, followed) and observer.parts < MOST_PARTS:
         observer.parts *= 2
+        followed = [_states(observer, n) for n in tried]
     if observer.parts >= MOST_PARTS:  # smaller steps are no help
         observer.parts = enough
     elif observer.parts > 1:  # what is stable so at the file's numbers has to be so at others
         observer.parts *= 2
-    observer.notes += [said for n in tried if (said := _lost(observer, n))]
+    observer.notes += [said for n, states in enumerate(followed) if (said := _lost(observer, n, states))]
     if observer.parts > 1:
         observer.notes.append(f"the model is stiff for the rows' step: every step is taken in {observer.parts} parts")
 
@@ -83,12 +85,16 @@ def _halves_differ(observer: Flown, n: int, x: np.ndarray, row: int, steps: int)
     return float(np.abs(error / observer.scales).max()) if np.isfinite(error).all() else np.inf
 
 
-def _unsteady(observer: Flown, tried: Iterable[int]) -> bool:
+def _states(observer: Flown, n: int) -> np.ndarray:
+    """States (rows, n) of the filter along a run, NaN where it is lost."""
+    return observer.filter(n, observer.point).states[:, : len(observer.kinds)]
+
+
+def _unsteady(observer: Flown, followed: Sequence[np.ndarray]) -> bool:
     """Whether a filter is lost, or a step and its halves differ at most states of some runs, or by a whole scale at
     any."""
     differ = list[float]()
-    for n in tried:
-        states = observer.filter(n, observer.point).states[:, : len(observer.kinds)]
+    for n, states in enumerate(followed):
         if not np.isfinite(states).all():
             return True
         rows = np.linspace(0, len(states) - 2, STATES_TRIED).astype(int)
@@ -96,9 +102,9 @@ def _unsteady(observer: Flown, tried: Iterable[int]) -> bool:
     return float(np.median(differ)) >= PARTS_TOLERANCE or max(differ) >= 1.0
 
 
-def _lost(observer: Flown, n: int) -> str:
+def _lost(observer: Flown, n: int, states: np.ndarray) -> str:
     """Where the filter of a run is lost, in words; empty: nowhere."""
-    states, run = observer.filter(n, observer.point).states[:, : len(observer.kinds)], observer.runs[n]
+    run = observer.runs[n]
     lost = np.flatnonzero(~np.isfinite(states).all(axis=1))
     if not len(lost):
         return ""
