@@ -58,11 +58,12 @@ def choose_parts(observer: Flown) -> None:
                 )  # fmt: skip
     enough = observer.parts
     followed = [_states(observer, n) for n in tried]
-    while _unsteady(observer, followed) and observer.parts < MOST_PARTS:
+    while (unsteady := _unsteady(observer, followed)) and observer.parts < MOST_PARTS:
         observer.parts *= 2
         followed = [_states(observer, n) for n in tried]
-    if observer.parts >= MOST_PARTS:  # smaller steps are no help
+    if unsteady:  # smaller steps are no help
         observer.parts = enough
+        observer.notes.append("steps and halves of them do not agree along the runs: the model jumps, or is lost")
     elif observer.parts > 1:  # what is stable so at the file's numbers has to be so at others
         observer.parts *= 2
     observer.notes += [said for n, states in enumerate(followed) if (said := _lost(observer, n, states))]

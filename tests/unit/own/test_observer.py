@@ -276,3 +276,15 @@ def test_a_sensor_that_reads_seldom_says_all_the_same_how_a_run_begins(linear):
     assert observer_of(vehicle, [more]).first_readings(0, nominal_point(vehicle.declared))[
         "place_rate"
     ] == pytest.approx(0.025)
+
+
+def test_a_model_that_jumps_at_speed_is_said_to_and_its_steps_stay(tmp_path, monkeypatch):
+    monkeypatch.setenv("GLIDER_OWN_PYTHON", "1")
+    (tmp_path / "whole.py").write_text(STIFF)
+    (tmp_path / "whole.toml").write_text('format = 1\nmodel = "whole"\n')
+    jump = "(100.0 if np.sin(1e4 * x[1]) > 0.0 else -100.0) * (abs(x[1]) > 0.05) + u[0] -"
+    (tmp_path / "jumps.py").write_text(STIFF.replace("u[0] -", jump))
+    (tmp_path / "jumps.toml").write_text('format = 1\nmodel = "jumps"\n[windows]\nseconds = 4.0\n')
+    found = observer_of(load_own(tmp_path / "jumps.toml"), [sped(load_own(tmp_path / "whole.toml"))])
+    assert found.parts == 1
+    assert any("do not agree along the runs" in note for note in found.notes)

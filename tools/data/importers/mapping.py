@@ -78,7 +78,7 @@ class ConversionTable(Table):
     def factor(self, density: float | None, mass: bool = False) -> float:
         """From logged steps to SI; a pressure becomes a depth of water of this density, kg/m3, a volume its `mass`."""
         kind, factor = UNITS[self.unit]
-        density = np.nan if density is None else density  # is there where it is needed (`check_rest`)
+        density = np.nan if density is None else density  # is there where it is needed (`check_common`)
         if kind == "volume" and mass:
             factor *= density
         if kind == "pressure":
@@ -179,7 +179,7 @@ class AnyMap(Protocol):
     def rates_from_attitude(self) -> bool: ...
 
 
-def check_rest(mapping: AnyMap, source: str, target: Target) -> None:
+def check_common(mapping: AnyMap, source: str, target: Target) -> None:
     """ConfigError where the water's density or the attitude is needed and missing, or a name is taken."""
     if mapping.water_density_kg_m3 is None:
         by = [name for name, one in {**mapping.columns, **mapping.extra}.items() if one.needs_density(name)]
@@ -206,7 +206,7 @@ def vehicle_of(mapping: AnyMap, base: Path, out: Path, target: Target) -> tuple[
 def _check(mapping: MapTable, source: str, target: Target) -> None:
     """What no single table can see; ConfigError."""
     check_columns(mapping.columns, source, target)
-    check_rest(mapping, source, target)
+    check_common(mapping, source, target)
     for name, command in mapping.commands.items():
         if name not in names.COMMANDS or name in mapping.columns:
             raise ConfigError(

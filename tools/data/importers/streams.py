@@ -24,7 +24,7 @@ from glider.tools.data.importers.mapping import (
     CutTable,
     Target,
     check_columns,
-    check_rest,
+    check_common,
     decode_checked,
     load_mapping,
     vehicle_of,
@@ -68,7 +68,7 @@ class StreamMap(Table, kw_only=True):
 
 def _check(mapping: StreamMap, source: str, target: Target) -> None:
     check_columns(mapping.columns, source, target)
-    check_rest(mapping, source, target)
+    check_common(mapping, source, target)
 
 
 def decode_stream_map(text: str, source: str, target: Target = RUN_DATA) -> StreamMap:
