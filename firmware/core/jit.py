@@ -21,14 +21,15 @@ KERNEL_DIRS = (
     "firmware/core", "sim_backend/core", "sim_backend/foreign", "sim_backend/ocean/core",
     "tools/inference/core", "tools/identify/core",
 )  # fmt: skip
-CONSTANT_FILES = ("hal/ports.py",)  # no kernels, but places in the frame that the kernels freeze
+# places in the frame that the kernels freeze; kernels that call a user's functions
+OTHER_FILES = ("hal/ports.py", "tools/own/kernels.py")
 KEEP_CACHES = 3
 
 
 def kernel_files() -> list[Path]:
     """Every source file whose kernels the cache key covers, in a fixed order."""
     kernels = [path for folder in KERNEL_DIRS for path in sorted((PACKAGES_DIR / folder).rglob("*.py"))]
-    return kernels + [PACKAGES_DIR / name for name in CONSTANT_FILES]
+    return kernels + [path for name in OTHER_FILES if (path := PACKAGES_DIR / name).is_file()]
 
 
 def kernels_digest() -> str:

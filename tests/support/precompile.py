@@ -16,6 +16,7 @@ from pathlib import Path
 
 from glider.firmware.core.jit import kernel_count
 from glider.tools.flight.precompile import Work
+from glider.tools.own.precompile import OBSERVER
 from glider.tools.study.precompile import CAMPAIGN
 
 
@@ -80,6 +81,7 @@ WORKS = (
     Work("challenge", kernel_count, _challenge_a_moment),
     CAMPAIGN,
     Work("ocean", kernel_count, _glide_a_moment),
+    OBSERVER,
 )
 
 

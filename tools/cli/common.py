@@ -120,6 +120,14 @@ def compile_diagnosis(case: Any) -> None:
     kind_of(case.vehicle).compile(say, progress)
 
 
+def compile_observer() -> None:
+    """Compile what observes a model of the user's, unless that was done."""
+    from glider.tools.flight.precompile import ensure_compiled
+    from glider.tools.own.precompile import OBSERVER
+
+    ensure_compiled(OBSERVER, say, progress)
+
+
 def compile_campaign() -> None:
     """Compile what flies many flights side by side, unless that was done."""
     from glider.tools.flight.precompile import ensure_compiled

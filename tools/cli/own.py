@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from glider.tools.cli.common import print_json, print_lines, say
+from glider.tools.cli.common import compile_observer, print_json, print_lines, say
 from glider.tools.data.errors import need
 from glider.tools.data.files import write_bytes
 
@@ -20,6 +20,8 @@ def own_vehicle(case: Path, wanted: str | None) -> Any:
     found = find(case, wanted)
     if found is not None:
         need("analysis")
+        if found.level:
+            compile_observer()
         if found.level and not found.kernels.compiled:
             say(f"note: the model runs as plain Python, some hundred times slower: {found.kernels.why}")
     return found

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from glider.tools.cli.common import json_option, print_json, print_lines, say
+from glider.tools.cli.common import compile_observer, json_option, print_json, print_lines, say
 from glider.tools.data.errors import InputError
 from glider.tools.data.files import check_writable, write_bytes
 
@@ -116,7 +116,7 @@ def check(file: Path, case: Path | None, as_json: bool) -> None:
     """
     from glider.tools.own.report_check import describe
 
-    found = describe(file, case)
+    found = describe(file, case, compile_observer)
     print_lines(found["lines"], as_json, found)
 
 

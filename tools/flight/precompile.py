@@ -83,7 +83,7 @@ def ensure_compiled(work: Work, say: Callable[[str], None], progress: Progress) 
     with _alone(work, stamp.parent, lambda: say("another process is compiling the kernels: waiting for it")):
         if stamp.exists():
             return
-        say(f"compiling the kernels of a {work.name}, once for this version: 1 to 4 minutes")
+        say(f"compiling the kernels of a {work.name}, once for this version: up to 4 minutes")
         with progress("compiling", work.count()) as advance:
             done = work.compile(advance)
         say(f"compiled in {done['seconds']:.0f} s, kept in {done['folder']}")

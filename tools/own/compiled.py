@@ -1,15 +1,18 @@
-"""A model's functions beside the observer's kernels: compiled by Numba where that can be, plain Python where not.
+"""A model's functions as the observer's kernels call them: compiled by Numba where that can be, plain Python where not.
 
-Numba cannot keep closures over a user's functions on the disk. So the user's source and the kernels are written into
-the cache folder under a hash of both, and compiled there as a module of their own, which keeps.
+The kernels are compiled once and take a model's functions as pointers. Numba cannot keep closures over a user's
+functions on the disk. So the user's source and calls.py are written into the cache folder under a hash of both, and
+compiled there as modules of their own, which keep.
 """
 
+import functools
 import hashlib
 import importlib.util
 import inspect
 import os
 import sys
 import types
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +20,13 @@ from typing import Any
 
 import numpy as np
 
+from glider.tools.own import kernels as python_kernels
 from glider.tools.own.neighbours import import_file, module_names, neighbours
 
-KERNELS = Path(__file__).with_name("kernels.py")
-NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run")
+KERNELS, CALLS = (Path(__file__).with_name(name) for name in ("kernels.py", "calls.py"))
+NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run",
+         "advance", "transition", "transition_by_steps", "transition_by_rates")  # fmt: skip
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile
 
 
@@ -37,14 +43,8 @@ class Kernels:
     why: str  # it is not compiled: one line
 
 
-def _functions(model: Any) -> dict[str, Callable[..., Any]]:
-    """step or derivative, and measure, of a model object."""
-    motion = "step" if hasattr(model, "step") else "derivative"
-    return {motion: getattr(model, motion), "measure": model.measure}
-
-
 def _module(name: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
-    """The kernels' file imported under a name, with the user's functions given; `advance` is that of their motion."""
+    """A file of this folder imported under a name, with some functions given."""
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
@@ -52,20 +52,48 @@ def _module(name: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
     sys.modules[name] = module
     spec.loader.exec_module(module)
     vars(module).update(given)
-    vars(module)["advance"] = module.advance_by_steps if "step" in given else module.advance_by_derivative
     return module
 
 
-def _as_array(function: Callable[..., Any]) -> Callable[..., np.ndarray]:
-    """A function whose answer may be any sequence, as one that returns float64."""
-    return lambda *given: np.asarray(function(*given), dtype=np.float64)
+@functools.cache
+def _compiled_kernels() -> types.ModuleType:
+    import numba
+
+    warnings.filterwarnings("ignore", "First-class function type", numba.core.errors.NumbaExperimentalFeatureWarning)
+    module = _module("glider_own_kernels", KERNELS, {})
+    for name in NAMES:
+        vars(module)[name] = numba.njit(**OPTIONS)(vars(module)[name])
+    return module
+
+
+def _motion(model: Any) -> str:
+    return "step" if hasattr(model, "step") else "derivative"
+
+
+def _bound(kernels: types.ModuleType, motion: Any, reads: Any, stepped: bool, measure: Any, why: str = "") -> Kernels:
+    """The kernels with a model's functions."""
+    filter_run, follow_run, fly_run = (
+        functools.partial(getattr(kernels, name), motion, reads, stepped)
+        for name in ("filter_run", "follow_run", "fly_run")
+    )
+    advance = functools.partial(kernels.advance, motion, stepped)
+    return Kernels(filter_run, follow_run, fly_run, advance, measure, not why, why)
 
 
 def plain(model: Any, why: str) -> Kernels:
     """The observer in plain Python."""
-    functions = {name: _as_array(one) for name, one in _functions(model).items()}
-    made = _module(f"glider_own_plain_{id(model)}", KERNELS, functions)
-    return Kernels(made.filter_run, made.follow_run, made.fly_run, made.advance, functions["measure"], False, why)
+    stepped, move = hasattr(model, "step"), getattr(model, _motion(model))
+
+    def motion(out: np.ndarray, x: np.ndarray, u: np.ndarray, w: np.ndarray, theta: np.ndarray, dt: float) -> None:
+        out[:] = move(x, u, w, theta, dt) if stepped else move(x, u, w, theta)
+
+    def reads(out: np.ndarray, x: np.ndarray, u: np.ndarray, theta: np.ndarray) -> None:
+        out[:] = model.measure(x, u, theta)
+
+    def measure(x: np.ndarray, u: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        return np.asarray(model.measure(x, u, theta), dtype=np.float64)
+
+    return _bound(python_kernels, motion, reads, stepped, measure, why)
 
 
 def kernels_of(model: Any, path: Path | None, attribute: str, tried: tuple[np.ndarray, ...]) -> Kernels:
@@ -78,7 +106,8 @@ def kernels_of(model: Any, path: Path | None, attribute: str, tried: tuple[np.nd
         return plain(model, f"{PLAIN} or GLIDER_JIT asks for plain Python")
     if path is None:
         return plain(model, "the model is no object of a file")
-    for name, one in _functions(model).items():
+    for name in (_motion(model), "measure"):
+        one = getattr(model, name)
         if inspect.ismethod(one) and not inspect.isclass(one.__self__):
             return plain(model, f"{name} is a method with self; write it as a static method or a function")
     try:
@@ -98,40 +127,42 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
 
     from glider.firmware.core import jit  # sets Numba's cache folder
 
-    source, motion = KERNELS.read_text(encoding="utf-8"), "step" if hasattr(model, "step") else "derivative"
+    source, motion = CALLS.read_text(encoding="utf-8"), _motion(model)
     # the model may call the tree's own kernels
     versions = (numba.__version__ + jit.kernels_digest()).encode()
     texts = {one.relative_to(path.parent): one.read_bytes() for one in (path, *neighbours(path))}
     key = hashlib.sha256(repr(texts).encode() + source.encode() + versions).hexdigest()[:20]
     folder = jit.cache_root() / "own" / key
-    kept, kernels = folder / path.name, folder / "observer_kernels.py"
-    for file, text in (*((folder / name, text) for name, text in texts.items()), (kernels, source.encode())):
+    kept, calls = folder / path.name, folder / "calls_of_the_model.py"
+    for file, text in (*((folder / name, text) for name, text in texts.items()), (calls, source.encode())):
         if not file.is_file() or file.read_bytes() != text:
             from glider.tools.data.files import write_bytes
 
             file.parent.mkdir(parents=True, exist_ok=True)
             write_bytes(file, text)
-    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
     theirs, beside = _user_module(kept, key, path.parent)
     own, compiled = {one.__name__ for one in (theirs, *beside.values())}, dict[types.FunctionType, Any]()
     for module in (theirs, *beside.values()):
         for name, value in list(vars(module).items()):
             if isinstance(value, types.FunctionType) and value.__module__ in own:
-                vars(module)[name] = compiled.setdefault(value, numba.njit(**options)(value))
+                vars(module)[name] = compiled.setdefault(value, numba.njit(**OPTIONS)(value))
     owner = getattr(theirs, attribute) if attribute else theirs
     given: dict[str, Any] = {}
     for name in (motion, "measure"):
         function = getattr(owner, name)
-        given[name] = function if hasattr(function, "py_func") else numba.njit(**options)(function)
-    name = f"glider_own_{key}"
-    observer = _module(name, kernels, given)
-    for one in (*NAMES, "advance"):
-        vars(observer)[one] = numba.njit(**options)(vars(observer)[one])
+        given[name] = function if hasattr(function, "py_func") else numba.njit(**OPTIONS)(function)
+    called = _module(f"glider_own_{key}", calls, given)
+    vector, number = numba.types.Array(numba.types.float64, 1, "C"), numba.types.float64
+    moves, reads = (
+        numba.cfunc(numba.types.void(*[vector] * arrays, *numbers), **OPTIONS)(function)
+        for function, arrays, numbers in ((called.state_after if motion == "step" else called.rates, 5, (number,)),
+                                          (called.readings, 4, ()))
+    )  # fmt: skip
+    found = _bound(_compiled_kernels(), moves, reads, motion == "step", given["measure"])
     x, u, w, theta = tried
-    observer.advance(x, u, w, theta, 0.01, 1)
+    found.advance(x, u, w, theta, 0.01, 1)
     given["measure"](x, u, theta)
-    return Kernels(observer.filter_run, observer.follow_run, observer.fly_run, observer.advance, given["measure"],
-                   True, "")  # fmt: skip
+    return found
 
 
 def _user_module(kept: Path, key: str, beside: Path) -> tuple[types.ModuleType, dict[str, types.ModuleType]]:

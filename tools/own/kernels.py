@@ -1,15 +1,14 @@
 """The observer of a declared model: an extended Kalman filter, followed by kept gains, and flown open loop.
 
-Everything that a model of the user's has to give is called through `advance` and `measure`, which stand here as names
-only: compiled.py executes this file beside the user's functions, compiled by Numba or as plain Python. Jacobians are
-forward differences on the manifold of the states.
+What a model of the user's has to give is handed in: motion(out, x, u, w, theta, dt), which writes the rates of the
+states into out (n,), or, where `stepped`, the states after dt; reads(out, x, u, theta), which writes the outputs. So
+the kernels are compiled once for all models (compiled.py), or run as plain Python. Jacobians are forward differences
+on the manifold of the states.
 
 Shapes: rows of a run r, states n, errors m (a quaternion has three), inputs i, outputs y, noises w; ports: a process
 (two states each) that adds to a noise, [noise, omega rad/s, tau s, sigma].
 """
 
-# ruff: noqa: F821
-# mypy: disable-error-code="name-defined"
 import numpy as np
 
 DIFFERENCE_STEP = 1e-6  # of a state's scale: difference step
@@ -114,7 +113,9 @@ def push_of(push, ports, a, w):
         w[int(ports[k, 0])] += a[2 * k]
 
 
-def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, scales, angles, parts, keep):
+def filter_run(
+    motion, reads, stepped, T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, scales, angles, parts, keep
+):
     """The filter along one run: -2 log likelihood, mean squared innovation, and what following it asks for.
 
     T (r,) s; U (r, 2, i): inputs from a row to the next, and at it; Y (r, y) with NaN; x0 (n,), its covariance
@@ -138,39 +139,18 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
     for k in range(n_o):
         P[at_own + k, at_own + k] = own[1, k] ** 2
     x, w, d, nu = x0.copy(), np.zeros(n_w), np.zeros(m), np.zeros(n_y)
+    h0, moved = np.zeros(n_y), np.zeros(n_y)
     lagged, history = np.zeros(n_y), np.zeros((len(T), n_y))
-    F, H = np.zeros((full, full)), np.zeros((n_y, full))
+    F, G, H = np.zeros((full, full)), np.zeros((full, n_w)), np.zeros((n_y, full))
     value, squares, samples = 0.0, 0.0, 0
     for row in range(len(T)):
         if row > 0:
             dt = T[row] - T[row - 1]
             push_of(push[row - 1], ports, a, w)
-            x1 = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
-            F[:, :] = 0.0
-            for j in range(m):
-                d[:] = 0.0
-                d[j] = DIFFERENCE_STEP * scales[j]
-                moved = normalised(advance(plus(x, d, kinds), U[row - 1, 0], w, theta, dt, parts), kinds)
-                minus(moved, x1, kinds, d)
-                for k in range(m):
-                    F[k, j] = d[k] / (DIFFERENCE_STEP * scales[j])
-            G = np.zeros((full, n_w))
-            for j in range(n_w):
-                size = DIFFERENCE_STEP * max(density[j], 1e-3)
-                w[j] += size
-                moved = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
-                w[j] -= size
-                minus(moved, x1, kinds, d)
-                for k in range(m):
-                    G[k, j] = d[k] / size
+            F[:, :], G[:, :] = 0.0, 0.0
+            by = motion, stepped, dt, parts
+            x1 = transition(by, x, U[row - 1, 0], w, theta, kinds, scales, density, own, F, G)
             for j in range(n_o):
-                place = int(own[0, j])
-                theta[place] += own[2, j]
-                moved = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
-                theta[place] -= own[2, j]
-                minus(moved, x1, kinds, d)
-                for k in range(m):
-                    F[k, at_own + j] = d[k] / own[2, j]
                 F[at_own + j, at_own + j] = 1.0
             for k in range(n_p):
                 decay = np.exp(-dt / ports[k, 2])
@@ -192,21 +172,21 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
                 P[m + 2 * k, m + 2 * k] += grown
                 P[m + 2 * k + 1, m + 2 * k + 1] += grown
             x = x1
-        h0 = measure(x, U[row, 1], theta)
+        reads(h0, x, U[row, 1], theta)
         h = read(h0, T[row], row, T, lagged, history, angles, S)
         difference(Y[row], h, angles, nu)
         H[:, :] = 0.0
         for k in range(m):
             d[:] = 0.0
             d[k] = DIFFERENCE_STEP * scales[k]
-            moved = measure(plus(x, d, kinds), U[row, 1], theta)
+            reads(moved, plus(x, d, kinds), U[row, 1], theta)
             for j in range(n_y):
                 step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
                 H[j, k] = S[0, j] * step / (DIFFERENCE_STEP * scales[k])
         for k in range(n_o):
             place = int(own[0, k])
             theta[place] += own[2, k]
-            moved = measure(x, U[row, 1], theta)
+            reads(moved, x, U[row, 1], theta)
             theta[place] -= own[2, k]
             for j in range(n_y):
                 step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
@@ -249,23 +229,24 @@ def filter_run(T, U, Y, x0, P0, theta, own, S, push, density, R, ports, kinds, s
     return value, squares, samples
 
 
-def follow_run(T, U, Y, x0, theta, own, S, push, ports, kinds, angles, parts, m, gains, states):
+def follow_run(motion, reads, stepped, T, U, Y, x0, theta, own, S, push, ports, kinds, angles, parts, m, gains, states):
     """States and own parameters (r, n + o) of another model by kept gains, into states."""
     n_y, n_w, n_p = Y.shape[1], push.shape[1], ports.shape[0]
-    x, w, nu, a = x0.copy(), np.zeros(n_w), np.zeros(n_y), np.zeros(2 * n_p)
+    x, w, nu, a, h0 = x0.copy(), np.zeros(n_w), np.zeros(n_y), np.zeros(2 * n_p), np.zeros(n_y)
     lagged, history = np.zeros(n_y), np.zeros((len(T), n_y))
     theta, at_own = theta.copy(), m + 2 * n_p
     for row in range(len(T)):
         if row > 0:
             dt = T[row] - T[row - 1]
             push_of(push[row - 1], ports, a, w)
-            x = normalised(advance(x, U[row - 1, 0], w, theta, dt, parts), kinds)
+            x = normalised(advance(motion, stepped, x, U[row - 1, 0], w, theta, dt, parts), kinds)
             for k in range(n_p):
                 decay = np.exp(-dt / ports[k, 2])
                 c, s = decay * np.cos(ports[k, 1] * dt), decay * np.sin(ports[k, 1] * dt)
                 a0, a1 = a[2 * k], a[2 * k + 1]
                 a[2 * k], a[2 * k + 1] = c * a0 + s * a1, c * a1 - s * a0
-        h = read(measure(x, U[row, 1], theta), T[row], row, T, lagged, history, angles, S)
+        reads(h0, x, U[row, 1], theta)
+        h = read(h0, T[row], row, T, lagged, history, angles, S)
         difference(Y[row], h, angles, nu)
         for j in range(n_y):
             if np.isnan(nu[j]):
@@ -279,11 +260,11 @@ def follow_run(T, U, Y, x0, theta, own, S, push, ports, kinds, angles, parts, m,
         states[row, : len(x)] = x
 
 
-def fly_run(T, U, starts, ends, X, theta, own, S, push, kinds, angles, parts, out):
+def fly_run(motion, reads, stepped, T, U, starts, ends, X, theta, own, S, push, kinds, angles, parts, out):
     """Outputs (r, y) of windows flown open loop from states and own parameters X (windows,
     n + o) at rows `starts` to rows `ends`, into out."""
     n_y, n = out.shape[1], X.shape[1] - own.shape[1]
-    theta = theta.copy()
+    theta, h = theta.copy(), np.zeros(n_y)
     for k in range(len(starts)):
         x = X[k, :n].copy()
         for j in range(own.shape[1]):
@@ -291,28 +272,119 @@ def fly_run(T, U, starts, ends, X, theta, own, S, push, kinds, angles, parts, ou
         lagged, history = np.zeros(n_y), np.zeros((ends[k] - starts[k], n_y))
         for row in range(starts[k], ends[k]):
             if row > starts[k]:
-                x = normalised(advance(x, U[row - 1, 0], push[row - 1], theta, T[row] - T[row - 1], parts), kinds)
+                dt = T[row] - T[row - 1]
+                x = normalised(advance(motion, stepped, x, U[row - 1, 0], push[row - 1], theta, dt, parts), kinds)
             since = row - starts[k]
-            h = measure(x, U[row, 1], theta)
+            reads(h, x, U[row, 1], theta)
             when = T[starts[k] : ends[k]]
             out[row] = read(h, T[row], since, when, lagged, history, angles, S)
             out[row] += S[2] * (T[starts[k]] - T[0])
 
 
-def advance_by_steps(x, u, w, theta, dt, parts):
-    """The state after dt, in parts, by the user's step."""
+def advance(motion, stepped, x, u, w, theta, dt, parts):
+    """The state (n,) after dt, in parts: by the user's steps, or by Runge and Kutta's of the fourth order."""
+    n, h, x = len(x), dt / parts, x.copy()
+    y = np.empty(n)
+    if stepped:
+        for _ in range(parts):
+            motion(y, x, u, w, theta, h)
+            x[:] = y
+        return x
+    rates, rate = np.zeros(n), np.empty(n)
     for _ in range(parts):
-        x = step(x, u, w, theta, dt / parts)
+        motion(rate, x, u, w, theta, h)
+        for stage in range(3):
+            share = 1.0 if stage == 2 else 0.5
+            for j in range(n):
+                rates[j] += (1.0 if stage == 0 else 2.0) * rate[j]
+                y[j] = x[j] + share * h * rate[j]
+            motion(rate, y, u, w, theta, h)
+        for j in range(n):
+            x[j] += h / 6.0 * (rates[j] + rate[j])
+            rates[j] = 0.0
     return x
 
 
-def advance_by_derivative(x, u, w, theta, dt, parts):
-    """The same by the user's derivative: Runge and Kutta's fourth order."""
-    h = dt / parts
+def transition(by, x, u, w, theta, kinds, scales, density, own, F, G):
+    """The state after dt, and what it has of an error of x, into F[:m, :m], of the noises, into G[:m], and of a run's
+    own parameters, into the last columns of F[:m]. by: motion, stepped, dt, parts."""
+    if by[1]:
+        return transition_by_steps(by, x, u, w, theta, kinds, scales, density, own, F, G)
+    return transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G)
+
+
+def transition_by_steps(by, x, u, w, theta, kinds, scales, density, own, F, G):
+    """`transition` by forward differences of the user's step."""
+    motion, stepped, dt, parts = by
+    m, at_own, d = len(scales), len(F) - own.shape[1], np.zeros(len(scales))
+    x1 = normalised(advance(motion, stepped, x, u, w, theta, dt, parts), kinds)
+    for j in range(m):
+        size = DIFFERENCE_STEP * scales[j]
+        d[:] = 0.0
+        d[j] = size
+        minus(normalised(advance(motion, stepped, plus(x, d, kinds), u, w, theta, dt, parts), kinds), x1, kinds, d)
+        F[:m, j] = d / size
+    for j in range(len(w)):
+        size = DIFFERENCE_STEP * max(density[j], 1e-3)
+        w[j] += size
+        minus(normalised(advance(motion, stepped, x, u, w, theta, dt, parts), kinds), x1, kinds, d)
+        w[j] -= size
+        G[:m, j] = d / size
+    for j in range(own.shape[1]):
+        place = int(own[0, j])
+        theta[place] += own[2, j]
+        minus(normalised(advance(motion, stepped, x, u, w, theta, dt, parts), kinds), x1, kinds, d)
+        theta[place] -= own[2, j]
+        F[:m, at_own + j] = d / own[2, j]
+    return x1
+
+
+def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
+    """`transition` by the user's derivative: what Runge and Kutta's step makes of the system, linear as it is midway
+    through a part, 1 + M + M^2 / 2 + M^3 / 6 + M^4 / 24, by forward differences there, part by part."""
+    motion, stepped, dt, parts = by
+    n, m, n_w, n_o, h = len(x), len(scales), len(w), own.shape[1], dt / parts
+    of_all = n + n_w + n_o
+    E, one, f, g, x1 = np.eye(of_all), np.eye(of_all), np.empty(n), np.empty(n), x
     for _ in range(parts):
-        a = derivative(x, u, w, theta)
-        b = derivative(x + 0.5 * h * a, u, w, theta)
-        c = derivative(x + 0.5 * h * b, u, w, theta)
-        d = derivative(x + h * c, u, w, theta)
-        x = x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-    return x
+        begun, k = x1, 0
+        x1 = advance(motion, stepped, begun, u, w, theta, h, 1)
+        M, middle = np.zeros((of_all, of_all)), 0.5 * (begun + x1)
+        motion(f, middle, u, w, theta, h)
+        for j in range(n):
+            size, usual = DIFFERENCE_STEP * scales[k], middle[j]
+            middle[j] += size
+            motion(g, middle, u, w, theta, h)
+            M[:n, j] = (g - f) * (h / size)
+            middle[j] = usual
+            if kinds[j] != 2:  # a quaternion has an error less than it has numbers
+                k += 1
+        for j in range(n_w):
+            size, usual = DIFFERENCE_STEP * max(density[j], 1e-3), w[j]
+            w[j] += size
+            motion(g, middle, u, w, theta, h)
+            M[:n, n + j] = (g - f) * (h / size)
+            w[j] = usual
+        for j in range(n_o):
+            place = int(own[0, j])
+            usual = theta[place]
+            theta[place] += own[2, j]
+            motion(g, middle, u, w, theta, h)
+            M[:n, n + n_w + j] = (g - f) * (h / own[2, j])
+            theta[place] = usual
+        E = (one + M @ (one + M @ (one + M @ (one + M / 4.0) / 3.0) / 2.0)) @ E
+    x1 = normalised(x1, kinds)
+    later, d = E[:n, :n].copy(), np.zeros(m)
+    for j in range(m):
+        size = DIFFERENCE_STEP * scales[j]
+        d[:] = 0.0
+        d[j] = size
+        minus(normalised(x1 + later @ (plus(x, d, kinds) - x), kinds), x1, kinds, d)
+        F[:m, j] = d / size
+    for j in range(n_w + n_o):
+        minus(normalised(x1 + DIFFERENCE_STEP * E[:n, n + j], kinds), x1, kinds, d)
+        if j < n_w:
+            G[:m, j] = d / DIFFERENCE_STEP
+        else:
+            F[:m, len(F) - n_o + j - n_w] = d / DIFFERENCE_STEP
+    return x1

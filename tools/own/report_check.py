@@ -1,5 +1,6 @@
 """`glider vehicle check`: what a model of one's own declares, and what can be asked of it."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,11 @@ ASKED = {
 }
 
 
-def describe(file: Path, case: Path | None) -> dict[str, Any]:
-    """What a vehicle file and its model are good for; InputError or ConfigError where they cannot be used."""
+def describe(file: Path, case: Path | None, compile_observer: Callable[[], None]) -> dict[str, Any]:
+    """What a vehicle file and its model are good for; InputError or ConfigError where they cannot be used.
+
+    compile_observer: called before a model is observed.
+    """
     if not file.is_file():
         raise InputError("no such file", source=file)
     if not is_own(read_text(file)):
@@ -30,6 +34,7 @@ def describe(file: Path, case: Path | None) -> dict[str, Any]:
     declared = vehicle.declared
     lines = [f"{vehicle.name}: level {vehicle.level}, {ASKED[vehicle.level]}"]
     if vehicle.level:
+        compile_observer()
         kernels = vehicle.kernels
         lines.append(
             "compiled by Numba" if kernels.compiled else f"plain Python, some hundred times slower: {kernels.why}"

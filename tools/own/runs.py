@@ -42,6 +42,10 @@ class OwnRun:
     outputs: np.ndarray  # (rows, outputs)
     path: Path | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("t", "inputs", "outputs"):  # kernels are compiled for rows that stand one behind the other
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
+
 
 def case_table(folder: Path) -> OwnCaseTable:
     """case.toml, or what it is taken for where runs lie without one: --vehicle names their vehicle then.
