@@ -116,18 +116,17 @@ class Engine:
     def fit(self, labels: tuple[str, ...], begin: Hypothesis | None = None, every: bool = False) -> Hypothesis:
         """Labels led to where they are most probable; evidence by the expansion there.
 
-        On the way the derivatives of the last expansion serve: a place is expanded anew where a way along them ends.
+        On the way the derivatives of the last expansion serve. A place is expanded anew where a way along them ends,
+        unless it gained what they had said: then they hold there too.
         """
         places = self.healthy.at(labels)
         columns = self.columns(places)
         shared = np.zeros(self.k) if begin is None else begin.shared.copy()
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
         rounds = ROUNDS if labels else FIRST_ROUNDS
+        known = [one.only(columns) for one in begin.found] if begin is not None and begin.everywhere else []
         for round_ in range(rounds):
-            if round_ or begin is None or not begin.everywhere:
-                found = self.expansions(own, columns, keep=round_ < rounds - 1)
-            else:
-                found = [one.only(columns) for one in begin.found]
+            found = known or self.expansions(own, columns, keep=round_ < rounds - 1)
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
             values = pooled.mean()
             led = np.array([run_values(one, values, by.scatter) for one in found])
@@ -138,7 +137,8 @@ class Engine:
                 break
             gained = 0.0
             if round_ < rounds - 1:
-                shared, own, gained = self._along(found, by, pooled.V, shared, own, places)
+                shared, own, gained, there = self._along(found, by, pooled.V, shared, own, places)
+                known = there if abs(gained - predicted_gain) < AT_REST else []
             if gained == 0.0:
                 break
         # what the parabola says of a place that the likelihood was not led to is no evidence
@@ -155,9 +155,9 @@ class Engine:
     def _along(
         self, found: Sequence[Expansion], by: Deviations, V: np.ndarray, shared: np.ndarray, own: np.ndarray,
         places: Sequence[int],
-    ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
+    ) -> tuple[np.ndarray, np.ndarray, float, list[Expansion]]:  # fmt: skip
         """Values led on from where runs are expanded by the derivatives there, V (k, k) the prior: shared (k,), own
-        (runs, k), and by how much -2 log posterior fell, flown at every place."""
+        (runs, k), by how much -2 log posterior fell, flown at every place, and the runs there by these derivatives."""
         most = room(self.reach)
         columns = self.columns(places)
         cost, gained, share = sum(one.value for one in found) + by.prior(shared, own, places), 0.0, 1.0
@@ -173,7 +173,7 @@ class Engine:
                 share *= 0.5
             else:
                 shared, own, found, cost, gained = tried, theirs, there, cost - gain, gained + gain
-        return shared, own, gained
+        return shared, own, gained, list(found)
 
     def variance(
         self, V: np.ndarray, places: Sequence[int], sizes: Sequence[float], shared: np.ndarray, form: float
