@@ -12,8 +12,8 @@ from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.skeleton import write_skeleton
 
-ROWS = 50
-EXPECTED = 105  # kernels, with what of NumPy Numba compiles for them
+IDLE_ROWS = 50
+COMPILED_KERNELS = 105  # kernels, with what of NumPy Numba compiles for them
 
 
 def _observe_a_moment() -> None:
@@ -22,12 +22,12 @@ def _observe_a_moment() -> None:
         path = Path(folder, "vehicle.toml")
         write_skeleton(path)
         vehicle = read_own(path)
-        t = 0.1 * np.arange(ROWS)
-        run = OwnRun("run00", t, np.zeros((ROWS, len(vehicle.declared.inputs))),
-                     np.zeros((ROWS, len(vehicle.declared.outputs))))  # fmt: skip
+        t = 0.1 * np.arange(IDLE_ROWS)
+        run = OwnRun("run00", t, np.zeros((IDLE_ROWS, len(vehicle.declared.inputs))),
+                     np.zeros((IDLE_ROWS, len(vehicle.declared.outputs))))  # fmt: skip
         observer = observer_of(vehicle, [run])
         states = observer.follow(0, observer.point, observer.filter(0, observer.point))
         observer.predict(0, observer.point, observer.horizon, states)
 
 
-OBSERVER = Work("model", lambda: EXPECTED, _observe_a_moment)
+OBSERVER = Work("model", lambda: COMPILED_KERNELS, _observe_a_moment)
