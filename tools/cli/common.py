@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import os
 import sys
 import threading
 import time
@@ -121,11 +122,13 @@ def compile_diagnosis(case: Any) -> None:
 
 
 def compile_observer() -> None:
-    """Compile what observes a model of the user's, unless that was done."""
+    """Compile what observes a model of the user's, unless that was done or plain Python is asked for."""
     from glider.tools.flight.precompile import ensure_compiled
+    from glider.tools.own.compiled import PLAIN
     from glider.tools.own.precompile import OBSERVER
 
-    ensure_compiled(OBSERVER, say, progress)
+    if not os.environ.get(PLAIN):
+        ensure_compiled(OBSERVER, say, progress)
 
 
 def compile_campaign() -> None:

@@ -7,9 +7,10 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
+from glider.tools.own.compiled import plain
 from glider.tools.own.declare import Declaration
 from glider.tools.own.effects import ModelPoint
-from glider.tools.own.load import LoadedVehicle
+from glider.tools.own.load import LoadedVehicle, user_error
 from glider.tools.own.runs import OwnRun
 
 STEPS_AT_START, TRIED_RUNS, STATES_TRIED = 20, 8, 20  # by which how fine a step has to be is found
@@ -50,6 +51,8 @@ def choose_parts(observer: Flown) -> None:
         while _halves_differ(observer, n, x, 0, STEPS_AT_START) >= PARTS_TOLERANCE:
             observer.parts *= 2
             if observer.parts >= MOST_PARTS:
+                if (raised := _raised(observer, n, x, 0, STEPS_AT_START)) is not None:
+                    raise raised
                 dt = float(np.median(np.diff(observer.runs[n].t)))
                 raise InputError(
                     f"the model is stiff: {MOST_PARTS} parts of a step of {dt:.3g} s do not agree with "
@@ -112,7 +115,23 @@ def _lost(observer: Flown, n: int, states: np.ndarray) -> str:
     before = states[max(lost[0] - 1, 0)]
     k = int(np.argmax(np.abs(before) / np.abs(states[: max(lost[0], 1)]).mean(axis=0).clip(1e-9)))
     at = f"{run.t[lost[0]] - run.t[0]:.3g} s"
-    return f"{run.name}: the filter is lost {at} after the start, {observer.declared.states[k].name} at {before[k]:.3g}"
+    said = f"{run.name}: the filter is lost {at} after the start, {observer.declared.states[k].name} at {before[k]:.3g}"
+    raised = _raised(observer, n, before, max(lost[0] - 1, 0), 2)
+    return f"{said}; {raised}" if raised else said
+
+
+def _raised(observer: Flown, n: int, x: np.ndarray, row: int, steps: int) -> InputError | None:
+    """What the user's functions raise in steps from a state of a row on: compiled, they answer NaN instead."""
+    run, slowly, theta = observer.runs[n], plain(observer.vehicle.model, "asked what it raises"), observer.point.theta
+    u, w, dt = run.inputs[row], np.zeros(len(observer.declared.noises)), float(np.median(np.diff(run.t)))
+    try:
+        with np.errstate(all="ignore"):
+            for _ in range(steps):
+                slowly.measure(x, u, theta)
+                x = slowly.advance(x, u, w, theta, dt, observer.parts)
+    except Exception as error:  # whatever the user's function raises
+        return user_error(error, observer.vehicle.source, run.name)
+    return None
 
 
 def time_constant(observer: Flown, n: int) -> float:

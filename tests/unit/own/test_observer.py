@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glider.tools.data.errors import InputError
 from glider.tools.own import kernels
 from glider.tools.own.check import load_own
 from glider.tools.own.declare import DERIVED
@@ -288,3 +289,90 @@ def test_a_model_that_jumps_at_speed_is_said_to_and_its_steps_stay(tmp_path, mon
     found = observer_of(load_own(tmp_path / "jumps.toml"), [sped(load_own(tmp_path / "whole.toml"))])
     assert found.parts == 1
     assert any("do not agree along the runs" in note for note in found.notes)
+
+
+TURNING = """
+import numpy as np
+inputs = {"push": "N"}
+outputs = [("place", "m", "place_m", 0.1)]
+parameters = [("damping", "1/s", 0.4, 0.1)]
+states = [("x", "m"), ("course", "rad", "angle"), *((f"q{n}", "1", "quaternion") for n in range(4))]
+noises = [("shove", "m/s2", 0.3)]
+def derivative(x, u, w, theta):
+    if x[0] > 2.0:
+        raise ValueError("deeper than it was built for")
+    p, q, r = 0.3 * x[0], -0.2 * np.sin(x[1]), 0.5
+    return np.array([u[0] - theta[0] * x[0] * abs(x[0]) + w[0], 0.7 * x[0] * np.cos(x[1]),
+                     -0.5 * (x[3] * p + x[4] * q + x[5] * r), 0.5 * (x[2] * p + x[4] * r - x[5] * q),
+                     0.5 * (x[2] * q + x[5] * p - x[3] * r), 0.5 * (x[2] * r + x[3] * q - x[4] * p)])
+def measure(x, u, theta):
+    return np.array([x[0]])
+"""
+
+
+def turning(folder):
+    (folder / "turning.py").write_text(TURNING)
+    (folder / "turning.toml").write_text('format = 1\nmodel = "turning"\n[windows]\nseconds = 4.0\n')
+    return load_own(folder / "turning.toml")
+
+
+@pytest.mark.parametrize("parts", [1, 3])
+def test_what_a_derivative_makes_of_errors_is_what_its_steps_make_of_them(tmp_path, parts):
+    model = turning(tmp_path).model
+
+    def motion(out, x, u, w, theta, dt):
+        out[:] = model.derivative(x, u, w, theta)
+
+    def whole(out, x, u, w, theta, dt):
+        out[:] = kernels.advance(motion, False, x, u, w, theta, dt, parts)
+
+    own, density, dt = np.array([[0.0], [0.1], [1e-6]]), np.array([0.3]), 0.05
+    x = kernels.normalised(np.array([0.8, 1.1, 0.7, -0.4, 0.5, 0.2]), KINDS)
+    found = []
+    for given_motion, stepped, taken in ((motion, False, parts), (whole, True, 1)):
+        F, G, theta = np.zeros((6, 6)), np.zeros((6, 1)), np.array([0.4])
+        after = kernels.transition(
+            (given_motion, stepped, dt, taken),
+            x,
+            np.array([0.3]),
+            np.zeros(1),
+            theta,
+            KINDS,
+            np.ones(5),
+            density,
+            own,
+            F,
+            G,
+        )
+        found.append((after, F, G))
+    (by_rates, F, G), (by_steps, F_steps, G_steps) = found
+    assert by_rates == pytest.approx(by_steps, abs=1e-12)
+    assert pytest.approx(F_steps, abs=1e-4) == F
+    assert pytest.approx(G_steps, abs=1e-5) == G
+    assert np.abs(F[:5, 5]).max() > 1e-3
+    assert np.abs(F[2:5, 0]).max() > 1e-3
+
+
+def test_what_a_compiled_function_raises_is_said_where_the_run_is_lost(tmp_path):
+    vehicle = turning(tmp_path)
+    assert vehicle.kernels.compiled, vehicle.kernels.why
+    t = 0.1 * np.arange(60)
+    run = OwnRun("run3", t, np.full((60, 1), 0.1), np.linspace(0.1, 2.5, 60)[:, None])
+    notes = observer_of(vehicle, [run]).notes
+    assert any(note.startswith("run3: the filter is lost") and "turning.py:10: " in note for note in notes), notes
+    with pytest.raises(InputError, match=r"turning\.py:10: run3: ValueError: deeper than"):
+        observer_of(vehicle, [replace(run, inputs=30.0 * run.inputs)])
+
+
+def test_the_observer_is_compiled_once_for_all_models(tmp_path):
+    for damping in (0.3, 0.5):
+        folder = tmp_path / str(damping)
+        folder.mkdir()
+        (folder / "linear.py").write_text(LINEAR.replace("0.4", str(damping)))
+        (folder / "linear.toml").write_text('format = 1\nmodel = "linear"\n[windows]\nseconds = 4.0\n')
+        vehicle = load_own(folder / "linear.toml")
+        run = OwnRun("run0", 0.1 * np.arange(60), np.zeros((60, 1)), np.zeros((1, 60)).T)
+        observer = observer_of(vehicle, [run])
+        assert np.isfinite(observer.filter(0, observer.point).value)
+        assert vehicle.kernels.compiled, vehicle.kernels.why
+        assert len(vehicle.kernels.filter_run.func.signatures) == 1
