@@ -1,10 +1,12 @@
 """A model's functions as the observer's kernels call them: compiled by Numba where that can be, plain Python where not.
 
-The kernels are compiled once and take a model's functions as pointers. Numba cannot keep closures over a user's
-functions on the disk. So the user's source and calls.py are written into the cache folder under a hash of both, and
+The kernels are compiled once and take a model's functions as pointers, of C's types: arrays of doubles, and dt.
+Functions that Numba cannot compile are pointers into Python (ctypes). It cannot keep closures over a user's functions
+on the disk, either. So the user's source and calls.py are written into the cache folder under a hash of both, and
 compiled there as modules of their own, which keep.
 """
 
+import ctypes
 import functools
 import hashlib
 import importlib.util
@@ -25,9 +27,11 @@ from glider.tools.own.neighbours import import_file, module_names, neighbours
 
 KERNELS, CALLS = (Path(__file__).with_name(name) for name in ("kernels.py", "calls.py"))
 NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run",
-         "advance", "transition", "transition_by_steps", "transition_by_rates")  # fmt: skip
+         "follow_near", "fly_near", "advance_near", "differ", "advance", "of_states", "transition",
+         "transition_by_steps", "transition_by_rates")  # fmt: skip
+RUNS, NEAR = ("filter_run", "follow_run", "fly_run"), ("follow_near", "fly_near")
 OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile
+PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile the user's functions
 
 
 @dataclass(frozen=True)
@@ -37,10 +41,12 @@ class Kernels:
     filter_run: Callable[..., Any]
     follow_run: Callable[..., Any]
     fly_run: Callable[..., Any]
+    follow_near: Callable[..., Any]
+    fly_near: Callable[..., Any]
     advance: Callable[..., Any]
     measure: Callable[..., Any]
-    compiled: bool
-    why: str  # it is not compiled: one line
+    compiled: bool  # the user's functions, too
+    why: str  # they are not: one line
 
 
 def _module(name: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
@@ -61,6 +67,7 @@ def _compiled_kernels() -> types.ModuleType:
 
     warnings.filterwarnings("ignore", "First-class function type", numba.core.errors.NumbaExperimentalFeatureWarning)
     module = _module("glider_own_kernels", KERNELS, {})
+    vars(module)["pointer"] = numba.njit(**OPTIONS)(lambda array: array.ctypes)
     for name in NAMES:
         vars(module)[name] = numba.njit(**OPTIONS)(vars(module)[name])
     return module
@@ -72,16 +79,14 @@ def _motion(model: Any) -> str:
 
 def _bound(kernels: types.ModuleType, motion: Any, reads: Any, stepped: bool, measure: Any, why: str = "") -> Kernels:
     """The kernels with a model's functions."""
-    filter_run, follow_run, fly_run = (
-        functools.partial(getattr(kernels, name), motion, reads, stepped)
-        for name in ("filter_run", "follow_run", "fly_run")
-    )
+    bound = [functools.partial(getattr(kernels, name), motion, reads, stepped) for name in RUNS]
+    near = [functools.partial(getattr(kernels, name), motion, reads) for name in NEAR]
     advance = functools.partial(kernels.advance, motion, stepped)
-    return Kernels(filter_run, follow_run, fly_run, advance, measure, not why, why)
+    return Kernels(*bound, *near, advance, measure, not why, why)
 
 
 def plain(model: Any, why: str) -> Kernels:
-    """The observer in plain Python."""
+    """The observer in plain Python, which raises what the user's functions raise."""
     stepped, move = hasattr(model, "step"), getattr(model, _motion(model))
 
     def motion(out: np.ndarray, x: np.ndarray, u: np.ndarray, w: np.ndarray, theta: np.ndarray, dt: float) -> None:
@@ -90,30 +95,120 @@ def plain(model: Any, why: str) -> Kernels:
     def reads(out: np.ndarray, x: np.ndarray, u: np.ndarray, theta: np.ndarray) -> None:
         out[:] = model.measure(x, u, theta)
 
+    return _bound(python_kernels, motion, reads, stepped, _measure(model), why)
+
+
+def _measure(model: Any) -> Callable[..., np.ndarray]:
     def measure(x: np.ndarray, u: np.ndarray, theta: np.ndarray) -> np.ndarray:
         return np.asarray(model.measure(x, u, theta), dtype=np.float64)
 
-    return _bound(python_kernels, motion, reads, stepped, measure, why)
+    return measure
 
 
-def kernels_of(model: Any, path: Path | None, attribute: str, tried: tuple[np.ndarray, ...]) -> Kernels:
-    """The observer of a model, from its file; why it is not compiled is in the answer.
+class _PythonFunction:
+    """A Python function behind a pointer: its arrays are copied into ones that it may keep, and what it raises is kept
+    for who called the kernel, which gets NaN from then on."""
+
+    def __init__(self, function: Callable[..., Any], out: int, given: tuple[np.ndarray, ...], numbers: int) -> None:
+        """function(*given, *numbers) answers `out` doubles; numbers: how many of those there are."""
+        self.raised: BaseException | None = None
+        result, lost = np.empty(out), np.full(out, np.nan)
+        from_array = [(one.ctypes.data, one.nbytes) for one in given]
+        result_at, lost_at, size, move = result.ctypes.data, lost.ctypes.data, result.nbytes, ctypes.memmove
+
+        def call(to: int, *rest: Any) -> None:
+            if self.raised is None:
+                try:
+                    for (address, length), pointer in zip(from_array, rest, strict=False):
+                        move(address, pointer, length)
+                    result[:] = function(*given, *rest[len(given) :])
+                    move(to, result_at, size)
+                    return
+                except BaseException as error:  # an interrupt, too, has to leave the kernel before it is raised
+                    self.raised = error
+            move(to, lost_at, size)
+
+        pointers, self.numbers = [ctypes.c_void_p] * (1 + len(given)), numbers
+        self.kept = ctypes.CFUNCTYPE(None, *pointers, *[ctypes.c_double] * numbers)(call)
+        self.arrays = given, result, lost
+
+
+def _called_back(model: Any, tried: tuple[np.ndarray, ...], outputs: int, why: str) -> Kernels:
+    """The compiled kernels, which call the user's functions as plain Python."""
+    from numba.core.types import WrapperAddressProtocol
+    from numba.experimental import function_type  # noqa: F401  makes it a type of arguments
+
+    class Pointer(WrapperAddressProtocol):  # type: ignore[misc]
+        def __init__(self, to: _PythonFunction, signature: Any) -> None:
+            self.to, self.called = to, signature
+
+        def __wrapper_address__(self) -> int:
+            return int(ctypes.cast(self.to.kept, ctypes.c_void_p).value or 0)
+
+        def signature(self) -> Any:
+            return self.called
+
+    (x, u, w, theta), stepped, move = (
+        (one.copy() for one in tried),
+        hasattr(model, "step"),
+        getattr(model, _motion(model)),
+    )
+    moves = _PythonFunction(move if stepped else lambda *given: move(*given[:-1]), len(x), (x, u, w, theta), 1)
+    reads = _PythonFunction(model.measure, outputs, (x, u, theta), 0)
+    pointers = (Pointer(one, called) for one, called in zip((moves, reads), _signatures(), strict=True))
+    found = _bound(_compiled_kernels(), *pointers, stepped, _measure(model), why)
+
+    def raising(kernel: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*given: Any) -> Any:
+            answer = kernel(*given)
+            for one in (moves, reads):
+                if one.raised is not None:
+                    error, one.raised = one.raised, None
+                    raise error
+            return answer
+
+        return call
+
+    return Kernels(*(raising(getattr(found, name)) for name in (*RUNS, *NEAR, "advance")), found.measure,
+                   compiled=False, why=why)  # fmt: skip
+
+
+def _signatures() -> tuple[Any, Any]:
+    """Numba's, of motion(out, x, u, w, theta, dt) and of reads(out, x, u, theta)."""
+    from numba import types as numbas
+
+    array = numbas.CPointer(numbas.float64)
+    return numbas.void(*5 * [array], numbas.float64), numbas.void(*4 * [array])
+
+
+def kernels_of(model: Any, path: Path | None, attribute: str, tried: tuple[np.ndarray, ...], outputs: int) -> Kernels:
+    """The observer of a model, from its file; why its functions are not compiled is in the answer.
 
     path: the Python file that it was loaded from; attribute: its name there, empty where the module is the model;
-    tried: x, u, w, theta that its functions are compiled for and called with once.
+    tried: x, u, w, theta that its functions are compiled for and called with once; outputs: how many it has.
     """
-    if os.environ.get(PLAIN) or os.environ.get("GLIDER_JIT", "1") == "0":
-        return plain(model, f"{PLAIN} or GLIDER_JIT asks for plain Python")
+    if os.environ.get("GLIDER_JIT", "1") == "0":
+        return plain(model, "GLIDER_JIT asks for plain Python")
+    if why := _not_compiled(model, path):
+        return _called_back(model, tried, outputs, why)
+    assert path is not None
+    try:
+        return _compiled(model, path, attribute, tried, outputs)
+    except Exception as error:  # whatever Numba has against a user's function: the model runs all the same
+        return _called_back(model, tried, outputs, _reason(error))
+
+
+def _not_compiled(model: Any, path: Path | None) -> str:
+    """Why a model's functions are not given to Numba: one line; empty: they are."""
+    if os.environ.get(PLAIN):
+        return f"{PLAIN} asks for plain Python"
     if path is None:
-        return plain(model, "the model is no object of a file")
+        return "the model is no object of a file"
     for name in (_motion(model), "measure"):
         one = getattr(model, name)
         if inspect.ismethod(one) and not inspect.isclass(one.__self__):
-            return plain(model, f"{name} is a method with self; write it as a static method or a function")
-    try:
-        return _compiled(model, path, attribute, tried)
-    except Exception as error:  # whatever Numba has against a user's function: the model runs all the same
-        return plain(model, _reason(error))
+            return f"{name} is a method with self; write it as a static method or a function"
+    return ""
 
 
 def _reason(error: Exception) -> str:
@@ -122,7 +217,7 @@ def _reason(error: Exception) -> str:
     return f"Numba: {(wanted or lines or [type(error).__name__])[0]}"[:200]
 
 
-def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, ...]) -> Kernels:
+def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, ...], outputs: int) -> Kernels:
     import numba
 
     from glider.firmware.core import jit  # sets Numba's cache folder
@@ -147,19 +242,18 @@ def _compiled(model: Any, path: Path, attribute: str, tried: tuple[np.ndarray, .
             if isinstance(value, types.FunctionType) and value.__module__ in own:
                 vars(module)[name] = compiled.setdefault(value, numba.njit(**OPTIONS)(value))
     owner = getattr(theirs, attribute) if attribute else theirs
-    given: dict[str, Any] = {}
+    x, u, w, theta = tried
+    given: dict[str, Any] = dict(
+        zip(("STATES", "INPUTS", "NOISES", "PARAMETERS"), (len(one) for one in tried), strict=True), OUTPUTS=outputs
+    )
     for name in (motion, "measure"):
         function = getattr(owner, name)
         given[name] = function if hasattr(function, "py_func") else numba.njit(**OPTIONS)(function)
     called = _module(f"glider_own_{key}", calls, given)
-    vector, number = numba.types.Array(numba.types.float64, 1, "C"), numba.types.float64
-    moves, reads = (
-        numba.cfunc(numba.types.void(*[vector] * arrays, *numbers), **OPTIONS)(function)
-        for function, arrays, numbers in ((called.state_after if motion == "step" else called.rates, 5, (number,)),
-                                          (called.readings, 4, ()))
-    )  # fmt: skip
+    functions = called.state_after if motion == "step" else called.rates, called.readings
+    moves, reads = (numba.cfunc(one, **OPTIONS)(function)
+                    for one, function in zip(_signatures(), functions, strict=True))  # fmt: skip
     found = _bound(_compiled_kernels(), moves, reads, motion == "step", given["measure"])
-    x, u, w, theta = tried
     found.advance(x, u, w, theta, 0.01, 1)
     given["measure"](x, u, theta)
     return found

@@ -18,6 +18,7 @@ from scipy.special import logsumexp
 from glider.tools.own.declare import Declaration
 from glider.tools.own.effects import Effect
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
+from glider.tools.own.near import errors_pushed
 from glider.tools.own.observer import Observer
 
 NOISE_SEED = 1
@@ -78,7 +79,7 @@ def responses(observer: Observer, n: int, horizon: float, healthy: ChannelErrors
     shapes = patterns_of(observer.runs[n].t, starts, ends)
     fast, declared = within_segments(observer.runs[n].t, shapes), observer.declared
     pushes = np.concatenate([at_noises(declared, shapes), at_noises(declared, fast[None])])
-    errors = observer.pushed(n, np.concatenate([np.zeros_like(pushes[:1]), pushes]), horizon)
+    errors = errors_pushed(observer, n, pushes, horizon)
     moves, seen = errors[1:] - errors[0], np.isfinite(observer.runs[n].outputs).any(axis=0)
     each = healthy.independent(n, moves)
     count = len(declared.noises)

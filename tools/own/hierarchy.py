@@ -14,6 +14,7 @@ import numpy as np
 from glider.tools.inference.pooled import Parabola
 from glider.tools.own.declare import Declaration
 from glider.tools.own.effects import FORM, NOISE, PUSH, Effect, driven_inputs, moved
+from glider.tools.own.near import errors_near
 from glider.tools.own.observer import Filtered, Observer
 from glider.tools.own.operating_points import point_weights
 
@@ -86,16 +87,15 @@ def expand(
     steps = np.where(at + steps > [one.high for one in effects], -steps, steps)
 
     def errors(places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        points = []
+        points = [here]
         for k, size in zip(places, sizes, strict=True):
             there = at.copy()
-            if k >= 0:
-                there[k] += size
+            there[k] += size
             points.append(moved(declared, base, effects, there))
-        return observer.residuals(n, points, by, horizon)
+        return errors_near(observer, n, points, by, horizon)
 
     moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE and k not in held], dtype=int)
-    E = errors(np.append(-1, moving), np.append(0.0, steps[moving]))
+    E = errors(moving, steps[moving])
     shape = E[0].shape
     e, J = E[0], np.zeros((len(effects), *shape))
     J[moving] = (E[1:] - E[0]) / steps[moving, None, None]
@@ -103,7 +103,7 @@ def expand(
     far = np.flatnonzero((size > LONG_STEP) & ~begins)
     if len(far):
         shorter = steps[far] * SHORTENED / size[far]
-        J[far] = (errors(far, shorter) - e) / shorter[:, None, None]
+        J[far] = (errors(far, shorter)[1:] - e) / shorter[:, None, None]
     J[~np.isfinite(J).all(axis=(1, 2))] = 0.0
     for k, (push, times) in held.items():
         J[k] = times * J[push]

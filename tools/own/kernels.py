@@ -15,6 +15,11 @@ DIFFERENCE_STEP = 1e-6  # of a state's scale: difference step
 CALM, LONGEST_MEMORY = 1e-12, 400  # s: shorter lags and delays are none; rows searched back for a delay
 
 
+def pointer(array):
+    """An array as the model's functions take it: where they are pointers, so is this (compiled.py)."""
+    return array
+
+
 def wrap(angle):
     """An angle within -pi to pi."""
     return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
@@ -172,21 +177,22 @@ def filter_run(
                 P[m + 2 * k, m + 2 * k] += grown
                 P[m + 2 * k + 1, m + 2 * k + 1] += grown
             x = x1
-        reads(h0, x, U[row, 1], theta)
+        reads(pointer(h0), pointer(x), pointer(U[row, 1]), pointer(theta))
         h = read(h0, T[row], row, T, lagged, history, angles, S)
         difference(Y[row], h, angles, nu)
         H[:, :] = 0.0
         for k in range(m):
             d[:] = 0.0
             d[k] = DIFFERENCE_STEP * scales[k]
-            reads(moved, plus(x, d, kinds), U[row, 1], theta)
+            x1 = plus(x, d, kinds)
+            reads(pointer(moved), pointer(x1), pointer(U[row, 1]), pointer(theta))
             for j in range(n_y):
                 step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
                 H[j, k] = S[0, j] * step / (DIFFERENCE_STEP * scales[k])
         for k in range(n_o):
             place = int(own[0, k])
             theta[place] += own[2, k]
-            reads(moved, x, U[row, 1], theta)
+            reads(pointer(moved), pointer(x), pointer(U[row, 1]), pointer(theta))
             theta[place] -= own[2, k]
             for j in range(n_y):
                 step = wrap(moved[j] - h0[j]) if angles[j] else moved[j] - h0[j]
@@ -245,7 +251,7 @@ def follow_run(motion, reads, stepped, T, U, Y, x0, theta, own, S, push, ports, 
                 c, s = decay * np.cos(ports[k, 1] * dt), decay * np.sin(ports[k, 1] * dt)
                 a0, a1 = a[2 * k], a[2 * k + 1]
                 a[2 * k], a[2 * k + 1] = c * a0 + s * a1, c * a1 - s * a0
-        reads(h0, x, U[row, 1], theta)
+        reads(pointer(h0), pointer(x), pointer(U[row, 1]), pointer(theta))
         h = read(h0, T[row], row, T, lagged, history, angles, S)
         difference(Y[row], h, angles, nu)
         for j in range(n_y):
@@ -275,10 +281,124 @@ def fly_run(motion, reads, stepped, T, U, starts, ends, X, theta, own, S, push, 
                 dt = T[row] - T[row - 1]
                 x = normalised(advance(motion, stepped, x, U[row - 1, 0], push[row - 1], theta, dt, parts), kinds)
             since = row - starts[k]
-            reads(h, x, U[row, 1], theta)
+            reads(pointer(h), pointer(x), pointer(U[row, 1]), pointer(theta))
             when = T[starts[k] : ends[k]]
             out[row] = read(h, T[row], since, when, lagged, history, angles, S)
             out[row] += S[2] * (T[starts[k]] - T[0])
+
+
+def follow_near(
+    motion, reads, T, U, Y, X, theta, own, S, push, which, ports, kinds, scales, density, angles, parts, gains, states
+):
+    """`follow_run` of a model that gives rates and of others near it (`advance_near`), into states (models, r, n + o).
+
+    Starts X (models, n), theta (models, parameters), S (models, 5, y); which (models, 2): places in U (driven, r, 2, i)
+    and push (pushed, r, w) of what drives and pushes each.
+    """
+    n_y, n_p, n_o, models, n = Y.shape[1], ports.shape[0], own.shape[1], X.shape[0], X.shape[1]
+    at_ports, u, w = gains.shape[1] - 2 * n_p - n_o, np.zeros((models, U.shape[3])), np.zeros((models, push.shape[2]))
+    X, theta, a, h = X.copy(), theta.copy(), np.zeros((models, 2 * n_p)), np.zeros(n_y)
+    nu, lagged, history = np.zeros((models, n_y)), np.zeros((models, n_y)), np.zeros((models, len(T), n_y))
+    for row in range(len(T)):
+        if row > 0:
+            dt = T[row] - T[row - 1]
+            for k in range(models):
+                u[k] = U[which[k, 0], row - 1, 0]
+                push_of(push[which[k, 1], row - 1], ports, a[k], w[k])
+            X = advance_near(motion, X, u, w, theta, dt, parts, kinds, scales, density)
+            for k in range(n_p):
+                decay = np.exp(-dt / ports[k, 2])
+                c, s = decay * np.cos(ports[k, 1] * dt), decay * np.sin(ports[k, 1] * dt)
+                for j in range(models):
+                    a0, a1 = a[j, 2 * k], a[j, 2 * k + 1]
+                    a[j, 2 * k], a[j, 2 * k + 1] = c * a0 + s * a1, c * a1 - s * a0
+        for k in range(models):
+            reads(pointer(h), pointer(X[k]), pointer(U[which[k, 0], row, 1]), pointer(theta[k]))
+            difference(Y[row], read(h, T[row], row, T, lagged[k], history[k], angles, S[k]), angles, nu[k])
+            for j in range(n_y):
+                if np.isnan(nu[k, j]):
+                    nu[k, j] = 0.0
+        moved = nu @ gains[row].T
+        for k in range(models):
+            X[k] = normalised(plus(X[k], moved[k, :at_ports], kinds), kinds)
+            for j in range(2 * n_p):
+                a[k, j] += moved[k, at_ports + j]
+            for j in range(n_o):
+                theta[k, int(own[0, j])] += moved[k, at_ports + 2 * n_p + j]
+                states[k, row, n + j] = theta[k, int(own[0, j])]
+            states[k, row, :n] = X[k]
+
+
+def fly_near(
+    motion, reads, T, U, starts, ends, X, theta, own, S, push, which, kinds, scales, density, angles, parts, out
+):
+    """`fly_run` of a model that gives rates and of others near it (`advance_near`), from X (models, windows, n + o),
+    into out (models, r, y); the others as in `follow_near`."""
+    n_y, models, n = out.shape[2], X.shape[0], X.shape[2] - own.shape[1]
+    theta, h = theta.copy(), np.zeros(n_y)
+    u, w = np.zeros((models, U.shape[3])), np.zeros((models, push.shape[2]))
+    for window in range(len(starts)):
+        first, end = starts[window], ends[window]
+        x, when = X[:, window, :n].copy(), T[first:end]
+        for k in range(models):
+            for j in range(own.shape[1]):
+                theta[k, int(own[0, j])] = X[k, window, n + j]
+        lagged, history = np.zeros((models, n_y)), np.zeros((models, end - first, n_y))
+        for row in range(first, end):
+            if row > first:
+                for k in range(models):
+                    u[k], w[k] = U[which[k, 0], row - 1, 0], push[which[k, 1], row - 1]
+                x = advance_near(motion, x, u, w, theta, T[row] - T[row - 1], parts, kinds, scales, density)
+            for k in range(models):
+                reads(pointer(h), pointer(x[k]), pointer(U[which[k, 0], row, 1]), pointer(theta[k]))
+                out[k, row] = read(h, T[row], row - first, when, lagged[k], history[k], angles, S[k])
+                out[k, row] += S[k, 2] * (T[first] - T[0])
+
+
+def advance_near(motion, X, u, w, theta, dt, parts, kinds, scales, density):
+    """States (models, n) after dt of a model, which comes first, and of others near it; each has its u, w and theta.
+
+    The first is advanced by Runge and Kutta's steps. The others' distances d from it follow d' = J d + s, with the
+    first's J midway through a part, and s by which their rates differ from its there: of noises to first order, of
+    other numbers as they are.
+    """
+    models, n, n_w = X.shape[0], X.shape[1], w.shape[1]
+    h, f, g, one = dt / parts, np.empty(n), np.empty(n), np.eye(n)
+    pushed, of_noises, driven = np.zeros((models, n)), np.zeros((n_w, n)), np.zeros(models, dtype=np.bool_)
+    for k in range(1, models):
+        driven[k] = differ(u[k], u[0]) or differ(theta[k], theta[0])
+    for _ in range(parts):
+        x = X[0].copy()
+        x1 = advance(motion, False, x, u[0], w[0], theta[0], h, 1)
+        middle, w0 = 0.5 * (x + x1), w[0].copy()
+        motion(pointer(f), pointer(middle), pointer(u[0]), pointer(w0), pointer(theta[0]), h)
+        M = of_states(motion, middle, f, u[0], w0, theta[0], h, kinds, scales)
+        for j in range(n_w):
+            size = DIFFERENCE_STEP * max(density[j], 1e-3)
+            w0[j] += size
+            motion(pointer(g), pointer(middle), pointer(u[0]), pointer(w0), pointer(theta[0]), h)
+            of_noises[j] = (g - f) * (h / size)
+            w0[j] = w[0, j]
+        pushed[:] = (w - w[0]) @ of_noises
+        for k in range(1, models):
+            if driven[k]:
+                motion(pointer(g), pointer(middle), pointer(u[k]), pointer(w0), pointer(theta[k]), h)
+                for j in range(n):
+                    pushed[k, j] += h * (g[j] - f[j])
+        by = one + M @ (one + M @ (one + M / 4.0) / 3.0) / 2.0
+        d = X - x
+        X = x1 + d + (d @ M.T + pushed) @ by.T
+    for k in range(models):
+        normalised(X[k], kinds)
+    return X
+
+
+def differ(a, b):
+    """Whether two vectors do."""
+    found = False
+    for j in range(len(a)):
+        found = found or a[j] != b[j]
+    return found
 
 
 def advance(motion, stepped, x, u, w, theta, dt, parts):
@@ -287,18 +407,18 @@ def advance(motion, stepped, x, u, w, theta, dt, parts):
     y = np.empty(n)
     if stepped:
         for _ in range(parts):
-            motion(y, x, u, w, theta, h)
+            motion(pointer(y), pointer(x), pointer(u), pointer(w), pointer(theta), h)
             x[:] = y
         return x
     rates, rate = np.zeros(n), np.empty(n)
     for _ in range(parts):
-        motion(rate, x, u, w, theta, h)
+        motion(pointer(rate), pointer(x), pointer(u), pointer(w), pointer(theta), h)
         for stage in range(3):
             share = 1.0 if stage == 2 else 0.5
             for j in range(n):
                 rates[j] += (1.0 if stage == 0 else 2.0) * rate[j]
                 y[j] = x[j] + share * h * rate[j]
-            motion(rate, y, u, w, theta, h)
+            motion(pointer(rate), pointer(y), pointer(u), pointer(w), pointer(theta), h)
         for j in range(n):
             x[j] += h / 6.0 * (rates[j] + rate[j])
             rates[j] = 0.0
@@ -339,6 +459,21 @@ def transition_by_steps(by, x, u, w, theta, kinds, scales, density, own, F, G):
     return x1
 
 
+def of_states(motion, x, f, u, w, theta, h, kinds, scales):
+    """h times the derivatives (n, n) of the rates f (n,) at x by the states: forward differences."""
+    n, k = len(x), 0
+    M, g = np.empty((n, n)), np.empty(n)
+    for j in range(n):
+        size, usual = DIFFERENCE_STEP * scales[k], x[j]
+        x[j] += size
+        motion(pointer(g), pointer(x), pointer(u), pointer(w), pointer(theta), h)
+        M[:, j] = (g - f) * (h / size)
+        x[j] = usual
+        if kinds[j] != 2:  # a quaternion has an error less than it has numbers
+            k += 1
+    return M
+
+
 def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
     """`transition` by the user's derivative: what Runge and Kutta's step makes of the system, linear as it is midway
     through a part, 1 + M + M^2 / 2 + M^3 / 6 + M^4 / 24, by forward differences there, part by part."""
@@ -347,29 +482,22 @@ def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
     of_all = n + n_w + n_o
     E, one, f, g, x1 = np.eye(of_all), np.eye(of_all), np.empty(n), np.empty(n), x
     for _ in range(parts):
-        begun, k = x1, 0
+        begun = x1
         x1 = advance(motion, stepped, begun, u, w, theta, h, 1)
         M, middle = np.zeros((of_all, of_all)), 0.5 * (begun + x1)
-        motion(f, middle, u, w, theta, h)
-        for j in range(n):
-            size, usual = DIFFERENCE_STEP * scales[k], middle[j]
-            middle[j] += size
-            motion(g, middle, u, w, theta, h)
-            M[:n, j] = (g - f) * (h / size)
-            middle[j] = usual
-            if kinds[j] != 2:  # a quaternion has an error less than it has numbers
-                k += 1
+        motion(pointer(f), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
+        M[:n, :n] = of_states(motion, middle, f, u, w, theta, h, kinds, scales)
         for j in range(n_w):
             size, usual = DIFFERENCE_STEP * max(density[j], 1e-3), w[j]
             w[j] += size
-            motion(g, middle, u, w, theta, h)
+            motion(pointer(g), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
             M[:n, n + j] = (g - f) * (h / size)
             w[j] = usual
         for j in range(n_o):
             place = int(own[0, j])
             usual = theta[place]
             theta[place] += own[2, j]
-            motion(g, middle, u, w, theta, h)
+            motion(pointer(g), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
             M[:n, n + n_w + j] = (g - f) * (h / own[2, j])
             theta[place] = usual
         E = (one + M @ (one + M @ (one + M @ (one + M / 4.0) / 3.0) / 2.0)) @ E

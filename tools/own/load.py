@@ -65,7 +65,9 @@ class LoadedVehicle:
     def kernels(self) -> Kernels:
         """The observer of the model, made when it is first asked for."""
         if self._kernels is None:
-            self._kernels = kernels_of(self.model, self.source, self.attribute, self.zeros())
+            self._kernels = kernels_of(
+                self.model, self.source, self.attribute, self.zeros(), len(self.declared.outputs)
+            )
         return self._kernels
 
 

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
+import numba
 import numpy as np
 
 from glider.tools.data.errors import InputError
@@ -260,22 +261,27 @@ class Observer:
         return out
 
     def errors(self, n: int, predicted: np.ndarray, horizon: float, wrapped: bool = True) -> np.ndarray:
-        """Measured less predicted in tolerances, (scored rows, outputs), NaN where nothing was measured.
+        """Measured less predicted (..., rows, outputs) in tolerances, (..., scored rows, outputs); NaN: not measured.
 
         wrapped: angles modulo 2 pi; else turns are counted from a window's start on, so that errors are smooth.
         """
         parts = [np.arange(a + 1, b) for a, b in zip(*self.windows(n, horizon), strict=True)]
         rows = np.concatenate(parts)
-        error = self.runs[n].outputs[rows] - predicted[rows]
-        error[:, self.angles] = names.wrap(error[:, self.angles])
+        measured, predicted = self.runs[n].outputs[rows], predicted[..., rows, :]
+        error = measured - predicted
+        error[..., self.angles] = names.wrap(error[..., self.angles])
         ends = np.cumsum([len(part) for part in parts])
         for k in np.flatnonzero(self.angles) if not wrapped else ():
             for a, b in zip(ends - [len(part) for part in parts], ends, strict=True):
-                seen = a + np.flatnonzero(np.isfinite(error[a:b, k]))
-                if np.abs(np.diff(error[seen, k])).max(initial=0.0) > np.pi:
-                    error[seen, k] = np.unwrap(error[seen, k])
-        lost = np.isnan(predicted[rows]).all(axis=1)
-        error[lost] = np.where(np.isnan(self.runs[n].outputs[rows[lost]]), np.nan, LOST * self.tolerances)
+                seen = a + np.flatnonzero(np.isfinite(measured[a:b, k]))
+                turned = np.any(np.abs(np.diff(error[..., seen, k])) > np.pi, axis=-1)
+                if turned.any():
+                    error[..., seen, k] = np.where(
+                        turned[..., None], np.unwrap(error[..., seen, k]), error[..., seen, k]
+                    )
+        lost = np.isnan(predicted).all(axis=-1)
+        if lost.any():
+            error[lost] = np.where(np.isnan(measured), np.nan, LOST * self.tolerances)[np.nonzero(lost)[-1]]
         with np.errstate(over="ignore"):
             return np.clip(error / self.tolerances, -LOST, LOST)
 
@@ -304,51 +310,31 @@ class Observer:
         begun = int(self.windows(n, horizon)[0][-1]) + 1  # rows until the last window has begun
 
         def one(point: ModelPoint) -> np.ndarray:
-            return self._smooth_errors(n, point, horizon, self.follow(n, point, by, begun))
+            return self.smooth_errors(n, self.predict(n, point, horizon, self.follow(n, point, by, begun)), horizon)
 
         return np.array(self.each(one, points))
 
-    def _smooth_errors(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:
-        """Errors (scored rows, outputs) of `predict`, turns counted, 0 where nothing was measured."""
-        predicted = self.predict(n, point, horizon, states, beside)
+    def smooth_errors(self, n: int, predicted: np.ndarray, horizon: float) -> np.ndarray:
+        """`errors` of a prediction, turns counted, 0 where nothing was measured."""
         return np.nan_to_num(self.errors(n, predicted, horizon, wrapped=False), nan=0.0)
 
-    def pushed(self, n: int, pushes: np.ndarray, horizon: float) -> np.ndarray:
-        """Errors of the observer's own model, as `residuals`, under forces (patterns, rows, noises) beside its own."""
-        states = self.filter(n, self.point).states
-        return np.array(self.each(lambda one: self._smooth_errors(n, self.point, horizon, states, one), pushes))
-
-    def unsettled(self, n: int, horizon: float) -> np.ndarray:
-        """Errors of the observer's own model, as `residuals`: as it is, and begun 1 sigma of the filter off in each of
-        (errors,) directions, in every window its own, that are independent."""
-        by = self.filter(n, self.point, covariances=True)
-        starts, _ = self.windows(n, horizon)
-        m, n_o, begun = len(self.scales), self.point.own.shape[1], [by.states]
-        full = by.covariances.shape[1]
-        known = np.append(np.arange(m), np.arange(full - n_o, full))
-        roots = {}
-        for row in starts:
-            sizes, axes = np.linalg.eigh(by.covariances[row][np.ix_(known, known)])
-            roots[row] = axes * np.sqrt(np.maximum(sizes, 0.0))
-        for k in range(len(known)):
-            states = by.states.copy()
-            for row, root in roots.items():
-                x = states[row, : len(self.kinds)]
-                states[row, : len(self.kinds)] = names.normalised(names.plus(x, root[:m, k], self.kinds), self.kinds)
-                states[row, len(self.kinds) :] += root[m:, k]
-            begun.append(states)
-        return np.array(self.each(lambda one: self._smooth_errors(n, self.point, horizon, one), begun))
+    @property
+    def gives_rates(self) -> bool:
+        """Whether the model is a derivative, so that others near it are flown beside it."""
+        return self.vehicle.level > 0 and not hasattr(self.vehicle.model, "step")
 
     def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
-        """Flights side by side: on two threads where they are compiled, every second on each."""
-        every = list(over)
-        if len(every) < 2 or not (self.vehicle.level and self.vehicle.kernels.compiled):
+        """Flights side by side, on as many threads as there are processors, where they are compiled."""
+        every, compiled = list(over), bool(self.vehicle.level and self.vehicle.kernels.compiled)
+        workers = min(len(every), numba.config.NUMBA_NUM_THREADS) if compiled else 1
+        if workers < 2:
             return [flown(each) for each in every]
-        with ThreadPoolExecutor(1) as pool:
-            others = pool.submit(lambda: [flown(each) for each in every[1::2]])
-            own = [flown(each) for each in every[::2]]
-            found: list[Any] = [None] * len(every)
-            found[::2], found[1::2] = own, others.result()
+        found: list[Any] = [None] * len(every)
+        with ThreadPoolExecutor(workers - 1) as pool:
+            others = [pool.submit(lambda k: [flown(each) for each in every[k::workers]], k) for k in range(1, workers)]
+            found[::workers] = [flown(each) for each in every[::workers]]
+            for k, one in enumerate(others):
+                found[k + 1 :: workers] = one.result()
         return found
 
     @property

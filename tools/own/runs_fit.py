@@ -42,9 +42,10 @@ class RunsFit:
 
     def expansions(self, keep: bool = False) -> list[Expansion]:
         """Every run about its own values."""
-        horizon = self.observer.horizon
-        return [expand(self.observer, n, self.nuisance, row, self.errors, horizon, keep)
-                for n, row in enumerate(self.own)]  # fmt: skip
+        observer, horizon = self.observer, self.observer.horizon
+        return observer.each(
+            lambda n: expand(observer, n, self.nuisance, self.own[n], self.errors, horizon, keep), range(len(self.own))
+        )
 
     def led_at_levels(self, say: Callable[[str], None]) -> "RunsFit":
         """The fit led on until it rests in what runs share, each run at its own level of errors.
@@ -198,7 +199,8 @@ class LineSearch:
             target = np.array([run_values(one, x, self.scatter) for one in self.warm])
             theirs = own + of_own * np.clip(target - own, -MOST_MOVED, MOST_MOVED)
             theirs = np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
-            return sum(self.misfit(n, row) for n, row in enumerate(theirs)) + self.prior(x, theirs), x, theirs
+            misfits = self.observer.each(lambda n: self.misfit(n, theirs[n]), range(len(theirs)))
+            return sum(misfits) + self.prior(x, theirs), x, theirs
 
         here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
         stay = here
