@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import os
 import sys
 import threading
 import time
@@ -122,13 +121,11 @@ def compile_diagnosis(case: Any) -> None:
 
 
 def compile_observer() -> None:
-    """Compile what observes a model of the user's, unless that was done or plain Python is asked for."""
+    """Compile what observes a model of the user's, unless that was done."""
     from glider.tools.flight.precompile import ensure_compiled
-    from glider.tools.own.compiled import PLAIN
     from glider.tools.own.precompile import OBSERVER
 
-    if not os.environ.get(PLAIN):
-        ensure_compiled(OBSERVER, say, progress)
+    ensure_compiled(OBSERVER, say, progress)
 
 
 def compile_campaign() -> None:

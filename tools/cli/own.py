@@ -23,7 +23,7 @@ def own_vehicle(case: Path, wanted: str | None) -> Any:
         if found.level:
             compile_observer()
         if found.level and not found.kernels.compiled:
-            say(f"note: the model runs as plain Python, some hundred times slower: {found.kernels.why}")
+            say(f"note: the model runs as {found.kernels.said}")
     return found
 
 

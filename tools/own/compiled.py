@@ -16,7 +16,7 @@ import sys
 import types
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,14 @@ OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile the user's functions
 
 
+class RaisedError(Exception):
+    """What a function of the user's raised while a kernel ran."""
+
+    def __init__(self, error: Exception):
+        super().__init__(str(error))
+        self.error = error
+
+
 @dataclass(frozen=True)
 class Kernels:
     """The observer of one model."""
@@ -47,6 +55,11 @@ class Kernels:
     measure: Callable[..., Any]
     compiled: bool  # the user's functions, too
     why: str  # they are not: one line
+
+    @property
+    def said(self) -> str:
+        """How the user's functions run, in words."""
+        return "compiled by Numba" if self.compiled else f"plain Python, ten to twenty times slower: {self.why}"
 
 
 def _module(name: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
@@ -79,23 +92,32 @@ def _motion(model: Any) -> str:
 
 def _bound(kernels: types.ModuleType, motion: Any, reads: Any, stepped: bool, measure: Any, why: str = "") -> Kernels:
     """The kernels with a model's functions."""
-    bound = [functools.partial(getattr(kernels, name), motion, reads, stepped) for name in RUNS]
-    near = [functools.partial(getattr(kernels, name), motion, reads) for name in NEAR]
+    given: dict[str, Any] = {name: functools.partial(getattr(kernels, name), motion, reads, stepped) for name in RUNS}
+    given |= {name: functools.partial(getattr(kernels, name), motion, reads) for name in NEAR}
     advance = functools.partial(kernels.advance, motion, stepped)
-    return Kernels(*bound, *near, advance, measure, not why, why)
+    return Kernels(**given, advance=advance, measure=measure, compiled=not why, why=why)
 
 
 def plain(model: Any, why: str) -> Kernels:
-    """The observer in plain Python, which raises what the user's functions raise."""
-    stepped, move = hasattr(model, "step"), getattr(model, _motion(model))
-
-    def motion(out: np.ndarray, x: np.ndarray, u: np.ndarray, w: np.ndarray, theta: np.ndarray, dt: float) -> None:
-        out[:] = move(x, u, w, theta, dt) if stepped else move(x, u, w, theta)
-
-    def reads(out: np.ndarray, x: np.ndarray, u: np.ndarray, theta: np.ndarray) -> None:
-        out[:] = model.measure(x, u, theta)
-
+    """The observer in plain Python; RaisedError: what the user's functions raise."""
+    stepped = hasattr(model, "step")
+    motion, reads = _written(_moves(model)), _written(model.measure)
     return _bound(python_kernels, motion, reads, stepped, _measure(model), why)
+
+
+def _moves(model: Any) -> Callable[..., Any]:
+    """The user's step, or the derivative, called as a step is."""
+    return model.step if hasattr(model, "step") else lambda *given: model.derivative(*given[:-1])
+
+
+def _written(function: Callable[..., Any]) -> Callable[..., None]:
+    def call(out: np.ndarray, *given: Any) -> None:
+        try:
+            out[:] = function(*given)
+        except Exception as error:
+            raise RaisedError(error) from error
+
+    return call
 
 
 def _measure(model: Any) -> Callable[..., np.ndarray]:
@@ -134,7 +156,7 @@ class _PythonFunction:
 
 
 def _called_back(model: Any, tried: tuple[np.ndarray, ...], outputs: int, why: str) -> Kernels:
-    """The compiled kernels, which call the user's functions as plain Python."""
+    """The compiled kernels, which call the user's functions as plain Python; RaisedError: what these raise."""
     from numba.core.types import WrapperAddressProtocol
     from numba.experimental import function_type  # noqa: F401  makes it a type of arguments
 
@@ -155,22 +177,24 @@ def _called_back(model: Any, tried: tuple[np.ndarray, ...], outputs: int, why: s
     )
     moves = _PythonFunction(move if stepped else lambda *given: move(*given[:-1]), len(x), (x, u, w, theta), 1)
     reads = _PythonFunction(model.measure, outputs, (x, u, theta), 0)
-    pointers = (Pointer(one, called) for one, called in zip((moves, reads), _signatures(), strict=True))
-    found = _bound(_compiled_kernels(), *pointers, stepped, _measure(model), why)
+    moving, reading = (Pointer(one, called) for one, called in zip((moves, reads), _signatures(), strict=True))
+    found = _bound(_compiled_kernels(), moving, reading, stepped, _measure(model), why)
 
     def raising(kernel: Callable[..., Any]) -> Callable[..., Any]:
         def call(*given: Any) -> Any:
-            answer = kernel(*given)
-            for one in (moves, reads):
-                if one.raised is not None:
-                    error, one.raised = one.raised, None
-                    raise error
-            return answer
+            try:
+                with np.errstate(all="ignore"):  # a model that diverges is far off
+                    return kernel(*given)
+            finally:  # what became of NaN is no error of its own
+                for one in (moves, reads):
+                    if one.raised is not None:
+                        error, one.raised = one.raised, None
+                        raise (RaisedError(error) if isinstance(error, Exception) else error) from error
 
         return call
 
-    return Kernels(*(raising(getattr(found, name)) for name in (*RUNS, *NEAR, "advance")), found.measure,
-                   compiled=False, why=why)  # fmt: skip
+    all_raising: dict[str, Any] = {name: raising(getattr(found, name)) for name in (*RUNS, *NEAR, "advance")}
+    return replace(found, **all_raising)
 
 
 def _signatures() -> tuple[Any, Any]:

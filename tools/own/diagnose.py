@@ -74,7 +74,7 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
     if verdict == "cause":
         cautions += confounded(group, "these runs")
     if vehicle.level and not vehicle.kernels.compiled:
-        cautions.append(f"the model runs as plain Python, some hundred times slower: {vehicle.kernels.why}")
+        cautions.append(f"the model runs as {vehicle.kernels.said}")
     return {
         "format": 1, "kind": KIND, "case": {"name": case, "vehicle": vehicle.name, "runs": len(observer.runs)},
         "verdict": verdict,

@@ -37,7 +37,7 @@ class Expansion(Parabola):
     diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
     derivatives: np.ndarray | None = None  # (k, rows, y) of the independent errors, where they are kept
-    filtered: Filtered | None = None  # the run's filter there, with them
+    filtered: Filtered | None = None  # the run's filter there, where it is kept
 
     def only(self, columns: np.ndarray) -> "Expansion":
         """The same in some columns; the others' rows are 0."""
@@ -72,11 +72,11 @@ class ChannelErrors:
 
 def expand(
     observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float,
-    keep: bool = False,
+    keep: bool = False, keep_filter: bool = False,
 ) -> Expansion:  # fmt: skip
     """Run n about the model at `at` (effects,) spreads: windows' errors made independent.
 
-    keep: the derivatives stay with it.
+    keep: the derivatives and the filter stay with it; keep_filter: the filter alone.
     """
     base, declared = observer.point, observer.declared
     here = moved(declared, base, effects, at)
@@ -127,7 +127,7 @@ def expand(
     return Expansion(
         at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
         np.where(seen, shape[0], 0), gap_squares, np.array(blocks), diagonal, reach,
-        J if keep else None, by if keep else None,
+        J if keep else None, by if keep or keep_filter else None,
     )  # fmt: skip
 
 

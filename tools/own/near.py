@@ -3,12 +3,14 @@
 Of models that give a derivative. Of those that give a step, or fly whole windows, every one is flown by itself.
 """
 
+import contextlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from glider.tools.own import kernels as names
+from glider.tools.own.compiled import RaisedError
 from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs
 from glider.tools.own.observer import Filtered, Observer
 
@@ -26,11 +28,12 @@ def errors_near(observer: Observer, n: int, points: Sequence[ModelPoint], by: Fi
 
     def flown(of: np.ndarray) -> np.ndarray:
         states = np.full((len(of), until, by.states.shape[1]), np.nan)
-        observer.vehicle.kernels.follow_near(
-            driven.t[:until], driven.U[:, :until], driven.Y[:until], X0[of], driven.theta[of], points[0].own,
-            driven.reading[of], driven.push[:, :until], driven.which[of], points[0].ports, observer.kinds,
-            observer.scales, points[0].density, observer.angles, observer.parts, by.gains[:until], states,
-        )  # fmt: skip
+        with contextlib.suppress(RaisedError):
+            observer.vehicle.kernels.follow_near(
+                driven.t[:until], driven.U[:, :until], driven.Y[:until], X0[of], driven.theta[of], points[0].own,
+                driven.reading[of], driven.push[:, :until], driven.which[of], points[0].ports, observer.kinds,
+                observer.scales, points[0].density, observer.angles, observer.parts, by.gains[:until], states,
+            )  # fmt: skip
         return driven.errors(of, states[:, starts], horizon)
 
     return _in_parts(observer, n, len(points), flown)
@@ -98,7 +101,7 @@ class _Driven:
         starts, ends = observer.windows(self.n, horizon)
         found = np.isfinite(states[0]).all(axis=1)
         out = np.full((len(of), *self.Y.shape), np.nan)
-        if found.any():
+        with contextlib.suppress(RaisedError):
             observer.vehicle.kernels.fly_near(
                 self.t, self.U, starts[found], ends[found], np.ascontiguousarray(states[:, found]), self.theta[of],
                 self.point.own, self.reading[of], self.push, self.which[of], observer.kinds, observer.scales,

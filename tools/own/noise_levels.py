@@ -6,7 +6,7 @@ import numpy as np
 
 from glider.tools.own.observer import ModelPoint, Observer
 
-LEVEL_ROWS, PLAIN_ROWS = 3_000, 600  # of runs from which noise levels are found: compiled, plain Python
+LEVEL_ROWS = 3_000  # of runs from which noise levels are found
 LEVEL_STEPS = (0.8, 0.4)  # e-folds
 MAX_LEVEL_SHIFT = 4.0  # e-folds from the file's noise, at most
 PARTS_ASKED = 1.0, 0.75, 0.5, 0.25, 0.0  # of what the filter's likelihood asks for, in e-folds
@@ -49,10 +49,9 @@ def _at(point: ModelPoint, levels: Levels, share: float = 1.0) -> ModelPoint:
 
 def _most_probable(observer: Observer, points: Sequence[ModelPoint]) -> Levels:
     """Levels by the filter's likelihood along the shortest runs."""
-    declared, budget = observer.declared, LEVEL_ROWS if observer.vehicle.kernels.compiled else PLAIN_ROWS
-    used, rows = list[int](), 0
+    declared, used, rows = observer.declared, list[int](), 0
     for n in sorted(range(len(observer.runs)), key=lambda n: len(observer.runs[n].t)):
-        if used and rows + len(observer.runs[n].t) > budget:
+        if used and rows + len(observer.runs[n].t) > LEVEL_ROWS:
             break
         used.append(n)
         rows += len(observer.runs[n].t)

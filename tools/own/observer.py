@@ -12,6 +12,7 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
+from glider.tools.own.compiled import RaisedError
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
 from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs, nominal_point
 from glider.tools.own.load import LoadedVehicle, called, user_error
@@ -198,8 +199,10 @@ class Observer:
                 )  # fmt: skip
         except np.linalg.LinAlgError:
             value, squares, samples = np.inf, np.inf, 1
-        except (ArithmeticError, ValueError, TypeError, IndexError) as error:
-            raise user_error(error, self.vehicle.source, f"{run.name}") from None
+        except RaisedError as raised:
+            if not isinstance(raised.error, np.linalg.LinAlgError):
+                raise user_error(raised.error, self.vehicle.source, f"{run.name}") from None
+            value, squares, samples = np.inf, np.inf, 1
         return Filtered(float(value), float(squares), int(samples), *keep)
 
     def follow(self, n: int, point: ModelPoint, by: Filtered, rows: int | None = None) -> np.ndarray:
@@ -210,7 +213,7 @@ class Observer:
         x, _ = self.start(n, point)
         driven = driven_inputs(run, self.declared, point)
         beside, driven = forces(self.declared, point, run.t, driven)[first], driven[first]
-        with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
+        with contextlib.suppress(RaisedError, np.linalg.LinAlgError):
             kernels.follow_run(
                 run.t[first], held_inputs(self.declared, driven), run.outputs[first], x, point.theta, point.own,
                 point.reading, beside, point.ports, self.kinds, self.angles, self.parts,
@@ -252,7 +255,7 @@ class Observer:
         found = np.isfinite(states[starts]).all(axis=1)
         starts, ends = starts[found], ends[found]
         if len(starts):
-            with contextlib.suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
+            with contextlib.suppress(RaisedError, np.linalg.LinAlgError):
                 kernels.fly_run(
                     run.t, held_inputs(self.declared, driven), starts, ends, states[starts], point.theta, point.own,
                     point.reading, forces(self.declared, point, run.t, driven) + beside, self.kinds, self.angles,
@@ -326,7 +329,8 @@ class Observer:
     def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
         """Flights side by side, on as many threads as there are processors, where they are compiled."""
         every, compiled = list(over), bool(self.vehicle.level and self.vehicle.kernels.compiled)
-        workers = min(len(every), numba.config.NUMBA_NUM_THREADS) if compiled else 1
+        threads = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # made at run time
+        workers = min(len(every), threads) if compiled else 1
         if workers < 2:
             return [flown(each) for each in every]
         found: list[Any] = [None] * len(every)

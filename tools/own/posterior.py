@@ -71,14 +71,15 @@ class Engine:
         return self.observer.each(lambda n: self.expansion_of(n, own[n], columns, keep), range(self.count))
 
     def expansion_of(
-        self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False, leveled: bool = True
-    ) -> Expansion:
+        self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False, leveled: bool = True,
+        keep_filter: bool = False,
+    ) -> Expansion:  # fmt: skip
         """Run n about its values (k,) in some columns, tempered; the others' rows are 0.
 
-        keep: with its derivatives; leveled: at its own level of errors.
+        keep, keep_filter: as in `expand`; leveled: at its own level of errors.
         """
         chosen, observer = [self.healthy.effects[k] for k in columns], self._observer_at(own, columns)
-        one = expand(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep)
+        one = expand(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep, keep_filter)
         one = one.tempered(self.healthy.eta)
         return self._widened(self.level.of(one) if leveled else one, columns, own)
 

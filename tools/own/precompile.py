@@ -8,6 +8,7 @@ import numpy as np
 
 from glider.tools.flight.precompile import Work
 from glider.tools.own.load import read_own
+from glider.tools.own.near import errors_near
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.skeleton import write_skeleton
@@ -26,8 +27,9 @@ def _observe_a_moment() -> None:
         run = OwnRun("run00", t, np.zeros((IDLE_ROWS, len(vehicle.declared.inputs))),
                      np.zeros((IDLE_ROWS, len(vehicle.declared.outputs))))  # fmt: skip
         observer = observer_of(vehicle, [run])
-        states = observer.follow(0, observer.point, observer.filter(0, observer.point))
-        observer.predict(0, observer.point, observer.horizon, states)
+        by = observer.filter(0, observer.point)
+        observer.predict(0, observer.point, observer.horizon, observer.follow(0, observer.point, by))
+        errors_near(observer, 0, [observer.point, observer.point], by, observer.horizon)
 
 
 OBSERVER = Work("model", lambda: COMPILED_KERNELS, _observe_a_moment)

@@ -36,9 +36,7 @@ def describe(file: Path, case: Path | None, compile_observer: Callable[[], None]
     if vehicle.level:
         compile_observer()
         kernels = vehicle.kernels
-        lines.append(
-            "compiled by Numba" if kernels.compiled else f"plain Python, some hundred times slower: {kernels.why}"
-        )
+        lines.append(kernels.said)
     for what in ("inputs", "outputs", "parameters", "states", "noises"):
         entries = getattr(declared, what)
         if entries:

@@ -40,11 +40,12 @@ class RunsFit:
     own: np.ndarray  # (runs, k)
     scatter: np.ndarray  # (k,)
 
-    def expansions(self, keep: bool = False) -> list[Expansion]:
-        """Every run about its own values."""
+    def expansions(self, keep: bool = False, keep_filter: bool = False) -> list[Expansion]:
+        """Every run about its own values; keep, keep_filter: as in `expand`."""
         observer, horizon = self.observer, self.observer.horizon
         return observer.each(
-            lambda n: expand(observer, n, self.nuisance, self.own[n], self.errors, horizon, keep), range(len(self.own))
+            lambda n: expand(observer, n, self.nuisance, self.own[n], self.errors, horizon, keep, keep_filter),
+            range(len(self.own)),
         )
 
     def led_at_levels(self, say: Callable[[str], None]) -> "RunsFit":
@@ -64,7 +65,7 @@ class RunsFit:
         """The fit led on until it rests, how runs differ learned, and what the form of the model cannot do."""
         fit, learned = replace(self), 0 if len(self.own) >= MIN_SCATTER_RUNS else SCATTER_ROUNDS
         for _ in range(ROUNDS):
-            found = fit.expansions()
+            found = fit.expansions(keep_filter=True)
             level = RunLevel(fit.errors, float(inflation(found)[-1]), 0.0)
             warm = [one.tempered(level.eta) for one in found]
             if learned < SCATTER_ROUNDS:
@@ -78,7 +79,7 @@ class RunsFit:
 
     def at_levels(self) -> tuple[list[Expansion], list[Expansion], RunLevel]:
         """Every run at its own level of errors, as it is and tempered."""
-        found = self.expansions()
+        found = self.expansions(keep_filter=True)
         scatter = level_scatter(found)
         plain = RunLevel(self.errors, 1.0, scatter)
         weighted = [one.weighted(plain.share(one)) for one in found]
@@ -165,7 +166,8 @@ def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
 
 @dataclass
 class LineSearch:
-    """The exact posterior along a step of the shared values."""
+    """The exact posterior along a step of the shared values; windows begun by the filter's gains where runs are
+    expanded, if these are kept, else by those of each place."""
 
     observer: Observer
     nuisance: list[Effect]
@@ -186,7 +188,8 @@ class LineSearch:
     def misfit(self, n: int, row: np.ndarray) -> float:
         point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
         flown = self.first + n
-        error = self.observer.residuals(flown, [point], self.observer.filter(flown, point), self.horizon)[0]
+        by = self.warm[n].filtered or self.observer.filter(flown, point)
+        error = self.observer.residuals(flown, [point], by, self.horizon)[0]
         squares = float(self.errors.misfit(flown, error)) / self.eta
         return squares if self.level is None else self.level.value(squares, self.level.count(self.warm[n]))
 

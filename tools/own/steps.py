@@ -7,10 +7,10 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
-from glider.tools.own.compiled import plain
+from glider.tools.own.compiled import RaisedError, plain
 from glider.tools.own.declare import Declaration
 from glider.tools.own.effects import ModelPoint
-from glider.tools.own.load import LoadedVehicle, user_error
+from glider.tools.own.load import LoadedVehicle, called, user_error
 from glider.tools.own.runs import OwnRun
 
 STEPS_AT_START, TRIED_RUNS, STATES_TRIED = 20, 8, 20  # by which how fine a step has to be is found
@@ -76,17 +76,26 @@ def choose_parts(observer: Flown) -> None:
 
 def _halves_differ(observer: Flown, n: int, x: np.ndarray, row: int, steps: int) -> float:
     """By how much steps of a row and two halves of each differ at last, of a state's scale: the most of states."""
-    kernels, u, w = observer.vehicle.kernels, observer.runs[n].inputs[row], np.zeros(len(observer.declared.noises))
-    dt, ends, error = float(np.median(np.diff(observer.runs[n].t))), list[np.ndarray](), np.zeros(len(observer.scales))
+    ends, error = list[np.ndarray](), np.zeros(len(observer.scales))
     for count in (observer.parts, 2 * observer.parts):
         end = x
         for _ in range(steps):
-            with np.errstate(all="ignore"):  # a model that diverges is far off
-                end = np.array(kernels.advance(end, u, w, observer.point.theta, dt, count))
-            end = names.normalised(end, observer.kinds)
+            end = _advanced(observer, n, end, row, count)
         ends.append(end)
     names.minus(ends[0], ends[1], observer.kinds, error)
     return float(np.abs(error / observer.scales).max()) if np.isfinite(error).all() else np.inf
+
+
+def _advanced(observer: Flown, n: int, x: np.ndarray, row: int, parts: int) -> np.ndarray:
+    """The state (n,) a row's step later; InputError where a function of the user's raises an error."""
+    run, w = observer.runs[n], np.zeros(len(observer.declared.noises))
+    dt = float(np.median(np.diff(run.t)))
+    try:
+        with np.errstate(all="ignore"):  # a model that diverges is far off
+            end = observer.vehicle.kernels.advance(x, run.inputs[row], w, observer.point.theta, dt, parts)
+    except RaisedError as raised:
+        raise user_error(raised.error, observer.vehicle.source, run.name) from None
+    return names.normalised(np.array(end), observer.kinds)
 
 
 def _states(observer: Flown, n: int) -> np.ndarray:
@@ -127,33 +136,29 @@ def _raised(observer: Flown, n: int, x: np.ndarray, row: int, steps: int) -> Inp
     try:
         with np.errstate(all="ignore"):
             for _ in range(steps):
-                slowly.measure(x, u, theta)
+                called(observer.vehicle, "measure", x, u, theta)
                 x = slowly.advance(x, u, w, theta, dt, observer.parts)
-    except Exception as error:  # whatever the user's function raises
-        return user_error(error, observer.vehicle.source, run.name)
+    except InputError as error:
+        return error
+    except RaisedError as raised:
+        return user_error(raised.error, observer.vehicle.source, run.name)
     return None
 
 
 def time_constant(observer: Flown, n: int) -> float:
     """Slowest decay of the model about a state of run n, s; what does not decay is left aside."""
-    kernels, run = observer.vehicle.kernels, observer.runs[n]
-    x = observer.filter(n, observer.point).states[
-        run.t.searchsorted(run.t[0] + 2.0, side="right") - 1, : len(observer.kinds)
-    ]
-    dt, w = float(np.median(np.diff(run.t))), np.zeros(len(observer.declared.noises))
-    base = names.normalised(
-        np.array(kernels.advance(x, run.inputs[0], w, observer.point.theta, dt, observer.parts)), observer.kinds
-    )
-    m = len(observer.scales)
+    run, m = observer.runs[n], len(observer.scales)
+    row = run.t.searchsorted(run.t[0] + 2.0, side="right") - 1
+    x = observer.filter(n, observer.point).states[row, : len(observer.kinds)]
+    base = _advanced(observer, n, x, 0, observer.parts)
     F, column = np.zeros((m, m)), np.zeros(m)
     for j in range(m):
         d = np.zeros(m)
         d[j] = names.DIFFERENCE_STEP * observer.scales[j]
-        end = kernels.advance(
-            names.plus(x, d, observer.kinds), run.inputs[0], w, observer.point.theta, dt, observer.parts
-        )
-        names.minus(names.normalised(np.array(end), observer.kinds), base, observer.kinds, column)
+        end = _advanced(observer, n, names.plus(x, d, observer.kinds), 0, observer.parts)
+        names.minus(end, base, observer.kinds, column)
         F[:, j] = column / d[j]
     size = np.abs(np.linalg.eigvals(F)) if np.isfinite(F).all() else np.zeros(0)
     decaying = size[(size < 1.0 - 1e-4) & (size > 0.0)]
+    dt = float(np.median(np.diff(run.t)))
     return float(np.max(-dt / np.log(decaying))) if len(decaying) else HORIZON[1] / TIME_CONSTANTS

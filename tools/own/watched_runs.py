@@ -54,7 +54,7 @@ class WatchedRuns(Engine):
         V = self.together.V / healthy.run_inflation
         shared, own = np.zeros(self.k), np.zeros((self.learned, self.k))
         for round_ in range(PREPARED):
-            found = [self.expansion_of(n, own[n], columns) for n in range(self.learned)]
+            found = [self.expansion_of(n, own[n], columns, keep_filter=True) for n in range(self.learned)]
             if self.learned > 2 and round_ < SCATTER_ROUNDS:
                 scatter = learn_scatter(found, self.together.V, healthy.scatter, learned_from=known_from)
                 self.together = replace(self.together, scatter=scatter)
@@ -81,7 +81,7 @@ class WatchedRuns(Engine):
         healthy, scatter, own = self.healthy, self.together.scatter, np.clip(begin, self.low, self.high)
         free = np.flatnonzero(scatter)
         for _ in range(OWN_ROUNDS):
-            found = self.expansion_of(n, own, free)
+            found = self.expansion_of(n, own, free, keep_filter=True)
             search = LineSearch(self.observer, healthy.effects, [found], scatter, healthy.eta, self.together.V,
                                 (self.low, self.high), healthy.errors, self.horizon, n, self.level)  # fmt: skip
             _, (moved_own,), _ = search.along(around, own[None], None)
