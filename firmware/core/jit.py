@@ -22,7 +22,7 @@ KERNEL_DIRS = (
     "tools/inference/core", "tools/identify/core",
 )  # fmt: skip
 # places in the frame that the kernels freeze; kernels that call a user's functions
-OTHER_FILES = ("hal/ports.py", "tools/own/kernels.py")
+OTHER_FILES = ("hal/ports.py", "tools/own/kernels.py", "tools/own/near_kernels.py")
 KEEP_CACHES = 3
 
 

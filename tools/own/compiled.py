@@ -23,12 +23,15 @@ from typing import Any
 import numpy as np
 
 from glider.tools.own import kernels as python_kernels
+from glider.tools.own import near_kernels as python_near_kernels
 from glider.tools.own.neighbours import import_file, module_names, neighbours
 
-KERNELS, CALLS = (Path(__file__).with_name(name) for name in ("kernels.py", "calls.py"))
+KERNELS, NEAR_KERNELS, CALLS = (
+    Path(__file__).with_name(name) for name in ("kernels.py", "near_kernels.py", "calls.py")
+)
 NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run",
-         "follow_near", "fly_near", "advance_near", "differ", "advance", "of_states", "transition",
-         "transition_by_steps", "transition_by_rates")  # fmt: skip
+         "advance", "of_states", "transition", "transition_by_steps", "transition_by_rates")  # fmt: skip
+NEAR_NAMES = "follow_near", "fly_near", "advance_near", "differ"
 RUNS, NEAR = ("filter_run", "follow_run", "fly_run"), ("follow_near", "fly_near")
 OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 PLAIN = "GLIDER_OWN_PYTHON"  # set: never compile the user's functions
@@ -75,22 +78,26 @@ def _module(name: str, path: Path, given: dict[str, Any]) -> types.ModuleType:
 
 
 @functools.cache
-def _compiled_kernels() -> types.ModuleType:
+def _compiled_kernels() -> types.SimpleNamespace:
     import numba
 
     warnings.filterwarnings("ignore", "First-class function type", numba.core.errors.NumbaExperimentalFeatureWarning)
     module = _module("glider_own_kernels", KERNELS, {})
-    vars(module)["pointer"] = numba.njit(**OPTIONS)(lambda array: array.ctypes)
+    compiled = {"pointer": numba.njit(**OPTIONS)(lambda array: array.ctypes)}
     for name in NAMES:
-        vars(module)[name] = numba.njit(**OPTIONS)(vars(module)[name])
-    return module
+        compiled[name] = numba.njit(**OPTIONS)(vars(module)[name])
+    vars(module).update(compiled)
+    near = _module("glider_own_near_kernels", NEAR_KERNELS, {})
+    compiled |= {name: numba.njit(**OPTIONS)(vars(near)[name]) for name in NEAR_NAMES}
+    vars(near).update(compiled)
+    return types.SimpleNamespace(**compiled)
 
 
 def _motion(model: Any) -> str:
     return "step" if hasattr(model, "step") else "derivative"
 
 
-def _bound(kernels: types.ModuleType, motion: Any, reads: Any, stepped: bool, measure: Any, why: str = "") -> Kernels:
+def _bound(kernels: Any, motion: Any, reads: Any, stepped: bool, measure: Any, why: str = "") -> Kernels:
     """The kernels with a model's functions."""
     given: dict[str, Any] = {name: functools.partial(getattr(kernels, name), motion, reads, stepped) for name in RUNS}
     given |= {name: functools.partial(getattr(kernels, name), motion, reads) for name in NEAR}
@@ -102,7 +109,8 @@ def plain(model: Any, why: str) -> Kernels:
     """The observer in plain Python; RaisedError: what the user's functions raise."""
     stepped = hasattr(model, "step")
     motion, reads = _written(_moves(model)), _written(model.measure)
-    return _bound(python_kernels, motion, reads, stepped, _measure(model), why)
+    kernels = types.SimpleNamespace(**vars(python_kernels) | vars(python_near_kernels))
+    return _bound(kernels, motion, reads, stepped, _measure(model), why)
 
 
 def _moves(model: Any) -> Callable[..., Any]:
