@@ -139,15 +139,18 @@ class _PythonFunction:
     """A Python function behind a pointer: its arrays are copied into ones that it may keep, and what it raises is kept
     for who called the kernel, which gets NaN from then on."""
 
-    def __init__(self, function: Callable[..., Any], out: int, given: tuple[np.ndarray, ...], numbers: int) -> None:
-        """function(*given, *numbers) answers `out` doubles; numbers: how many of those there are."""
-        self.raised: BaseException | None = None
+    def __init__(
+        self, function: Callable[..., Any], out: int, given: tuple[np.ndarray, ...], numbers: int,
+        raised: list[BaseException],
+    ) -> None:  # fmt: skip
+        """function(*given, *numbers) answers `out` doubles; numbers: how many of those there are; raised: what any of a
+        model's functions has raised in a call of a kernel."""
         result, lost = np.empty(out), np.full(out, np.nan)
         from_array = [(one.ctypes.data, one.nbytes) for one in given]
         result_at, lost_at, size, move = result.ctypes.data, lost.ctypes.data, result.nbytes, ctypes.memmove
 
         def call(to: int, *rest: Any) -> None:
-            if self.raised is None:
+            if not raised:
                 try:
                     for (address, length), pointer in zip(from_array, rest, strict=False):
                         move(address, pointer, length)
@@ -155,10 +158,10 @@ class _PythonFunction:
                     move(to, result_at, size)
                     return
                 except BaseException as error:  # an interrupt, too, has to leave the kernel before it is raised
-                    self.raised = error
+                    raised.append(error)
             move(to, lost_at, size)
 
-        pointers, self.numbers = [ctypes.c_void_p] * (1 + len(given)), numbers
+        pointers = [ctypes.c_void_p] * (1 + len(given))
         self.kept = ctypes.CFUNCTYPE(None, *pointers, *[ctypes.c_double] * numbers)(call)
         self.arrays = given, result, lost
 
@@ -178,13 +181,10 @@ def _called_back(model: Any, tried: tuple[np.ndarray, ...], outputs: int, why: s
         def signature(self) -> Any:
             return self.called
 
-    (x, u, w, theta), stepped, move = (
-        (one.copy() for one in tried),
-        hasattr(model, "step"),
-        getattr(model, _motion(model)),
-    )
-    moves = _PythonFunction(move if stepped else lambda *given: move(*given[:-1]), len(x), (x, u, w, theta), 1)
-    reads = _PythonFunction(model.measure, outputs, (x, u, theta), 0)
+    x, u, w, theta = (one.copy() for one in tried)
+    stepped, raised = hasattr(model, "step"), list[BaseException]()
+    moves = _PythonFunction(_moves(model), len(x), (x, u, w, theta), 1, raised)
+    reads = _PythonFunction(model.measure, outputs, (x, u, theta), 0, raised)
     moving, reading = (Pointer(one, called) for one, called in zip((moves, reads), _signatures(), strict=True))
     found = _bound(_compiled_kernels(), moving, reading, stepped, _measure(model), why)
 
@@ -194,10 +194,9 @@ def _called_back(model: Any, tried: tuple[np.ndarray, ...], outputs: int, why: s
                 with np.errstate(all="ignore"):  # a model that diverges is far off
                     return kernel(*given)
             finally:  # what became of NaN is no error of its own
-                for one in (moves, reads):
-                    if one.raised is not None:
-                        error, one.raised = one.raised, None
-                        raise (RaisedError(error) if isinstance(error, Exception) else error) from error
+                if raised:
+                    error = raised.pop()
+                    raise (RaisedError(error) if isinstance(error, Exception) else error) from error
 
         return call
 
