@@ -47,9 +47,11 @@ def measure(x, u, theta):
 def initial(y):
     return np.array([y["angle"], y["angle_rate"], 1.0, 0.0, 0.0, 0.0]), np.array([0.02, 0.1, 0.05, 0.05, 0.05])
 """
-DICTIONARIES = PENDULUM.replace("    out[0] = x[1]\n", "    out[0] = x[PLACES['rate']]\n").replace(
-    "    y = np.empty(2)\n", "    y = np.empty(2)\n    assert x[0] == x[0]\n"
-) + """
+DICTIONARIES = (
+    PENDULUM.replace("    out[0] = x[1]\n", "    out[0] = x[PLACES['rate']]\n").replace(
+        "    y = np.empty(2)\n", "    y = np.empty(2)\n    assert x[0] == x[0]\n"
+    )
+    + """
 PLACES = {"rate": 1}
 """
 )
