@@ -360,6 +360,18 @@ def of_states(motion, x, f, u, w, theta, h, kinds, scales):
     return M
 
 
+def of_noises(motion, x, f, u, w, theta, h, density):
+    """The same (n, w) by the noises."""
+    M, g = np.empty((len(x), len(w))), np.empty(len(x))
+    for j in range(len(w)):
+        size, usual = DIFFERENCE_STEP * max(density[j], 1e-3), w[j]
+        w[j] += size
+        motion(pointer(g), pointer(x), pointer(u), pointer(w), pointer(theta), h)
+        M[:, j] = (g - f) * (h / size)
+        w[j] = usual
+    return M
+
+
 def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
     """`transition` by the user's derivative: what Runge and Kutta's step makes of the system, linear as it is midway
     through a part, 1 + M + M^2 / 2 + M^3 / 6 + M^4 / 24, by forward differences there, part by part."""
@@ -373,12 +385,7 @@ def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
         M, middle = np.zeros((of_all, of_all)), 0.5 * (begun + x1)
         motion(pointer(f), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
         M[:n, :n] = of_states(motion, middle, f, u, w, theta, h, kinds, scales)
-        for j in range(n_w):
-            size, usual = DIFFERENCE_STEP * max(density[j], 1e-3), w[j]
-            w[j] += size
-            motion(pointer(g), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
-            M[:n, n + j] = (g - f) * (h / size)
-            w[j] = usual
+        M[:n, n : n + n_w] = of_noises(motion, middle, f, u, w, theta, h, density)
         for j in range(n_o):
             place = int(own[0, j])
             usual = theta[place]

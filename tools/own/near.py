@@ -19,7 +19,7 @@ MOST_ROWS = 400_000  # of models flown at once: memory
 
 def errors_near(observer: Observer, n: int, points: Sequence[ModelPoint], by: Filtered, horizon: float) -> np.ndarray:
     """Errors of models in tolerances, as `Observer.residuals` has them, of which the others are near the first."""
-    if not observer.gives_rates or len(points) < 2:
+    if not observer.gives_rates:
         return observer.residuals(n, points, by, horizon)
     starts, _ = observer.windows(n, horizon)
     driven = _Driven(observer, n, points)

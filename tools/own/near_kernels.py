@@ -6,10 +6,10 @@ Shapes as there; models that are flown.
 import numpy as np
 
 from glider.tools.own.kernels import (
-    DIFFERENCE_STEP,
     advance,
     difference,
     normalised,
+    of_noises,
     of_states,
     plus,
     pointer,
@@ -93,9 +93,9 @@ def advance_near(motion, X, u, w, theta, dt, parts, kinds, scales, density):
     first's J midway through a part, and s by which their rates differ from its there: of noises to first order, of
     other numbers as they are.
     """
-    models, n, n_w = X.shape[0], X.shape[1], w.shape[1]
+    models, n = X.shape
     h, f, g, one = dt / parts, np.empty(n), np.empty(n), np.eye(n)
-    pushed, of_noises, driven = np.zeros((models, n)), np.zeros((n_w, n)), np.zeros(models, dtype=np.bool_)
+    pushed, driven = np.zeros((models, n)), np.zeros(models, dtype=np.bool_)
     for k in range(1, models):
         driven[k] = differ(u[k], u[0]) or differ(theta[k], theta[0])
     for _ in range(parts):
@@ -104,13 +104,7 @@ def advance_near(motion, X, u, w, theta, dt, parts, kinds, scales, density):
         middle, w0 = 0.5 * (x + x1), w[0].copy()
         motion(pointer(f), pointer(middle), pointer(u[0]), pointer(w0), pointer(theta[0]), h)
         M = of_states(motion, middle, f, u[0], w0, theta[0], h, kinds, scales)
-        for j in range(n_w):
-            size = DIFFERENCE_STEP * max(density[j], 1e-3)
-            w0[j] += size
-            motion(pointer(g), pointer(middle), pointer(u[0]), pointer(w0), pointer(theta[0]), h)
-            of_noises[j] = (g - f) * (h / size)
-            w0[j] = w[0, j]
-        pushed[:] = (w - w[0]) @ of_noises
+        pushed[:] = (w - w[0]) @ of_noises(motion, middle, f, u[0], w0, theta[0], h, density).T
         for k in range(1, models):
             if driven[k]:
                 motion(pointer(g), pointer(middle), pointer(u[k]), pointer(w0), pointer(theta[k]), h)

@@ -2,6 +2,7 @@
 
 import contextlib
 import copy
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -327,10 +328,12 @@ class Observer:
         return self.vehicle.level > 0 and not hasattr(self.vehicle.model, "step")
 
     def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
-        """Flights side by side, on as many threads as there are processors, where they are compiled."""
+        """Flights side by side, on as many threads as there are processors, where they are compiled; one after the
+        other on such a thread."""
         every, compiled = list(over), bool(self.vehicle.level and self.vehicle.kernels.compiled)
         threads = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # made at run time
-        workers = min(len(every), threads) if compiled else 1
+        alone = threading.current_thread() is threading.main_thread()
+        workers = min(len(every), threads) if compiled and alone else 1
         if workers < 2:
             return [flown(each) for each in every]
         found: list[Any] = [None] * len(every)

@@ -14,7 +14,7 @@ from glider.tools.own.runs import OwnRun
 from glider.tools.own.skeleton import write_skeleton
 
 IDLE_ROWS = 50
-COMPILED_KERNELS = 119  # kernels, with what of NumPy Numba compiles for them
+COMPILED_KERNELS = 120  # kernels, with what of NumPy Numba compiles for them
 
 
 def _observe_a_moment() -> None:
