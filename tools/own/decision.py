@@ -61,8 +61,9 @@ class Healthy:
 
     @property
     def session_share(self) -> float:
-        """Variance between sessions over that from run to run, of all that differs (geometric mean)."""
-        differs = (self.scatter > 0.0) & (self.session > 0.0)
+        """Variance between sessions over that from run to run, of all that differs (geometric mean) but instruments:
+        how their biases do, the vehicle file says."""
+        differs = (self.scatter > 0.0) & (self.session > 0.0) & [one.family != OUTPUT for one in self.effects]
         return (
             float(np.exp(2.0 * np.log(self.session[differs] / self.scatter[differs]).mean())) if differs.any() else 0.0
         )

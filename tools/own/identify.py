@@ -174,7 +174,9 @@ def identify(
         found = fit.expansions()
         *_, eta = inflation(found)
     counts, tempered = [len(one) for one in sessions], [one.tempered(eta) for one in found]
-    scatter, session_scatter = learn_sessions(tempered, V, scatter, counts)
+    allowed = {f"{one.name}_bias" for one in declared.outputs if one.bias > 0.0}
+    biases = np.array([one.label in allowed for one in nuisance], dtype=float)
+    scatter, session_scatter = learn_sessions(tempered, V, scatter, counts, biases)
     warm = [marginalised(one, scatter) for one in tempered]
     each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
     apart = session_scatter if len(counts) > 1 else np.zeros_like(scatter)
@@ -235,16 +237,18 @@ def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> 
 
 
 def learn_sessions(
-    found: Sequence[Expansion], V: np.ndarray, scatter: np.ndarray, counts: Sequence[int]
+    found: Sequence[Expansion], V: np.ndarray, scatter: np.ndarray, counts: Sequence[int], allowed: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """1 sigma (nuisance,) from run to run within sessions, and of sessions beside that.
 
-    scatter: over all runs. One session says nothing of how sessions differ: what is usual is assumed.
+    scatter: over all runs; allowed (nuisance,): by which the vehicle file allows sessions to differ, spreads (a bias is
+    another in each case). One session says nothing of how sessions differ: what is usual is assumed.
     """
     if len(counts) < 2:
-        return scatter, np.sqrt(USUAL_SESSION_SHARE) * scatter
+        return scatter, np.hypot(np.sqrt(USUAL_SESSION_SHARE) * scatter, allowed)
     within = learn_scatter(found, V + np.diag(scatter**2), scatter, counts)
-    return within, learn_scatter(in_sessions(found, within, counts), V, np.sqrt(USUAL_SESSION_SHARE) * within)
+    usual = np.hypot(np.sqrt(USUAL_SESSION_SHARE) * within, allowed)
+    return within, learn_scatter(in_sessions(found, within, counts), V, usual)
 
 
 def in_sessions(found: Sequence[Expansion], scatter: np.ndarray, counts: Sequence[int]) -> list[Parabola]:

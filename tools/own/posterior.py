@@ -28,6 +28,7 @@ from glider.tools.own.decision import (
     strangeness,
 )
 from glider.tools.own.effects import FORM, NOISE, PUSH, UNEXPLAINED, moved
+from glider.tools.own.evidence import Place, alone, size_evidence, under_priors
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room
 from glider.tools.own.observer import Observer
@@ -36,6 +37,7 @@ NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS = 6, 3
 ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all others begin
 WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
+SHORTENED = 0.25  # of a step at most, after a way that ended worse
 STRONG, STRONG_LEFT, STRONG_ROWS = (
     (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
     1.5,
@@ -118,7 +120,8 @@ class Engine:
         """Labels led to where they are most probable; evidence by the expansion there.
 
         On the way the derivatives of the last expansion serve. A place is expanded anew where a way along them ends,
-        unless it gained what they had said: then they hold there too.
+        unless it gained what they had said: then they hold there too. Where it is worse by its own filter, the way is
+        taken back, and the next is shorter.
         """
         places = self.healthy.at(labels)
         columns = self.columns(places)
@@ -126,10 +129,14 @@ class Engine:
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
         rounds = ROUNDS if labels else FIRST_ROUNDS
         known = [one.only(columns) for one in begin.found] if begin is not None and begin.everywhere else []
+        most, by, last = room(self.reach), self.together, None
         for round_ in range(rounds):
-            found = known or self.expansions(own, columns, keep=round_ < rounds - 1)
+            here = Place(shared, own, known or self.expansions(own, columns, keep=round_ < rounds - 1))
+            if last is not None and here.cost(by, places) > last.cost(by, places) + 2.0 * AT_REST:
+                here, most = last, SHORTENED * most
+            last, shared, own, found = here, here.shared, here.own, here.found
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
-            values = pooled.mean()
+            values = replace(pooled, V=by.V).mean()
             led = np.array([run_values(one, values, by.scatter) for one in found])
             predicted_gain = sum(one.value - one.at_place(x) for one, x in zip(found, led, strict=True))
             predicted_gain += by.prior(shared, own, places) - by.prior(values, led, places)
@@ -138,7 +145,7 @@ class Engine:
                 break
             gained = 0.0
             if round_ < rounds - 1:
-                shared, own, gained, there = self._along(found, by, pooled.V, shared, own, places)
+                shared, own, gained, there = self._along(here, by, places, most)
                 known = there if abs(gained - predicted_gain) < AT_REST else []
             if gained == 0.0:
                 break
@@ -154,16 +161,15 @@ class Engine:
         return fitted
 
     def _along(
-        self, found: Sequence[Expansion], by: Deviations, V: np.ndarray, shared: np.ndarray, own: np.ndarray,
-        places: Sequence[int],
-    ) -> tuple[np.ndarray, np.ndarray, float, list[Expansion]]:  # fmt: skip
-        """Values led on from where runs are expanded by the derivatives there, V (k, k) the prior: shared (k,), own
-        (runs, k), by how much -2 log posterior fell, flown at every place, and the runs there by these derivatives."""
-        most = room(self.reach)
-        columns = self.columns(places)
-        cost, gained, share = sum(one.value for one in found) + by.prior(shared, own, places), 0.0, 1.0
+        self, here: Place, by: Deviations, places: Sequence[int], most: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float, list[Expansion]]:
+        """Values led on from where runs are expanded by the derivatives there, a step at most `most` (k,) spreads:
+        shared (k,), own (runs, k), by how much -2 log posterior fell, flown at every place, and the runs there by these
+        derivatives."""
+        columns, shared, own, found = self.columns(places), here.shared, here.own, here.found
+        cost, gained, share = here.cost(by, places), 0.0, 1.0
         for _ in range(WAY):
-            target = np.clip(Pooled.of(by.marginal(found), V).mean(), self.low, self.high)
+            target = np.clip(Pooled.of(by.marginal(found), by.V).mean(), self.low, self.high)
             step = np.clip(target - shared, -most, most)
             of_runs = np.array([run_values(one, shared + step, by.scatter) for one in found])
             of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -most, most)
@@ -193,7 +199,8 @@ class Engine:
     def _best_sizes(
         self, found: Sequence[Expansion], places: Sequence[int], shared: np.ndarray
     ) -> tuple[Deviations, Pooled, float, np.ndarray, np.ndarray]:
-        """The most probable deviations and runs pooled with their prior, log evidence over all, sizes with their sd.
+        """The most probable deviations if labels are as they have it, runs pooled with the most probable prior, log
+        evidence over all, sizes with their sd.
 
         Priors of the grid differ in a few variances, d: with W = (1 + V H)^-1, Q = (H W) and q = W' r at these,
         they add to the evidence what `under_priors` says (Woodbury).
@@ -222,7 +229,9 @@ class Engine:
         best = int(np.argmax(nat))
         *sizes, form = grid[best]
         at = replace(pooled, V=self.variance(by.V, places, sizes, shared, form))
-        return by, at, evidence, np.clip(mean[best], self.low[places], self.high[places]), sd[best]
+        *sizes, form = grid[max((n for n, one in enumerate(grid) if not one[-1]), key=lambda n: nat[n])]
+        led = replace(by, V=self.variance(by.V, places, sizes, shared, form))
+        return led, at, evidence, np.clip(mean[best], self.low[places], self.high[places]), sd[best]
 
     def label_gains(self, slope: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Log evidence (k,) that each label gains by its parabola, beside what is integrated out, and its size there.
@@ -403,30 +412,3 @@ class Engine:
         gain, left = found.evidence - nothing.evidence, np.sqrt(found.left.mean())
         self.say(f"{' + '.join(labels)}: {gain:.1f} nat, {left:.2f} left")
         return found
-
-
-def alone(pooled: Pooled) -> tuple[np.ndarray, np.ndarray]:
-    """Slope and precision (k,) of the size of each label in all runs, what they share integrated out."""
-    M = pooled.covariance()
-    return pooled.r - pooled.H @ (M @ pooled.r), np.maximum(np.diag(pooled.H - pooled.H @ M @ pooled.H), 0.0)
-
-
-def under_priors(slope: np.ndarray, precision: np.ndarray, variances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Log evidence (priors,) that sizes N(0, diag(d)) bring, (q' S q - log det(1 + d Q)) / 2, and their covariances
-    S = (d^-1 + Q)^-1 (priors, v, v); q slope (v,), Q precision (v, v), d variances (priors, v)."""
-    inner = np.eye(len(slope)) + variances[:, :, None] * precision
-    S = np.linalg.solve(inner, variances[:, :, None] * np.eye(len(slope)))
-    return 0.5 * (np.einsum("a,nab,b->n", slope, S, slope) - np.linalg.slogdet(inner)[1]), S
-
-
-def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
-    """Log evidence of a label's size over none, from its slope and precision with all else integrated out.
-
-    All may be arrays of one shape.
-    """
-    slope, precision, reach, one_sided = (np.asarray(one)[..., None] for one in (slope, precision, reach, one_sided))
-    tau2 = (SIZES / reach) ** 2
-    total = 1.0 + tau2 * np.maximum(precision, 0.0)
-    gain = 0.5 * (slope**2 * tau2 / total - np.log(total))
-    halved = np.log(2.0) + norm.logcdf(slope * np.sqrt(tau2 / total))
-    return logsumexp(gain + np.where(one_sided, halved, 0.0), axis=-1) - np.log(len(SIZES))

@@ -167,7 +167,7 @@ def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
 @dataclass
 class LineSearch:
     """The exact posterior along a step of the shared values; windows begun by the filter's gains where runs are
-    expanded, if these are kept, else by those of each place."""
+    expanded, if these are kept, else by those of each place. A place that is worse by its own is searched by these."""
 
     observer: Observer
     nuisance: list[Effect]
@@ -196,14 +196,30 @@ class LineSearch:
     def along(self, values: np.ndarray, own: np.ndarray, pooled: Pooled | None) -> tuple[np.ndarray, np.ndarray, float]:
         """Values, runs' own values and the gain of a step, damped until the exact posterior gains; without the runs
         pooled, of their own values alone."""
+        x, theirs, gain = self._along(values, own, pooled)
+        if all(one.filtered is None for one in self.warm):
+            return x, theirs, gain
+        anew = replace(self, warm=[replace(one, filtered=None) for one in self.warm])
+        before = sum(one.value for one in self.warm) + self.prior(values, own)
+        if anew.cost(x, theirs) <= before + CONVERGED_GAIN:
+            return x, theirs, gain
+        return anew.along(values, own, pooled)
+
+    def cost(self, x: np.ndarray, theirs: np.ndarray) -> float:
+        """-2 log posterior of shared values x (k,) and runs' own (runs, k)."""
+        return sum(self.observer.each(lambda n: self.misfit(n, theirs[n]), range(len(theirs)))) + self.prior(x, theirs)
+
+    def _along(
+        self, values: np.ndarray, own: np.ndarray, pooled: Pooled | None
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """`along`, by the filters that it has."""
 
         def at(step: np.ndarray, of_own: float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
             x = np.clip(values + step, *self.limits)
             target = np.array([run_values(one, x, self.scatter) for one in self.warm])
             theirs = own + of_own * np.clip(target - own, -MOST_MOVED, MOST_MOVED)
             theirs = np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
-            misfits = self.observer.each(lambda n: self.misfit(n, theirs[n]), range(len(theirs)))
-            return sum(misfits) + self.prior(x, theirs), x, theirs
+            return self.cost(x, theirs), x, theirs
 
         here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
         stay = here

@@ -15,9 +15,10 @@ from scipy.stats import norm
 from glider.tools.inference.pooled import Pooled, log_prior, marginalised, without
 from glider.tools.own.decision import SIZES, UsualLabels, log_odds
 from glider.tools.own.effects import PARAMETER, Effect, form_errors, standard_effects, unexplained
+from glider.tools.own.evidence import alone, size_evidence
 from glider.tools.own.hierarchy import LEAST_REACH, RunLevel, expand, inflation
 from glider.tools.own.measure import total_rms
-from glider.tools.own.posterior import MOST_EFFECTS, alone, size_evidence
+from glider.tools.own.posterior import MOST_EFFECTS
 from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, SCATTERS, USUAL_OWN_SCATTER, RunsFit, left_out
 
 USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads

@@ -26,10 +26,11 @@ from glider.tools.own.decision import (
     usual_share,
 )
 from glider.tools.own.effects import FORM, UNEXPLAINED
+from glider.tools.own.evidence import under_priors
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observers import observer_of
-from glider.tools.own.posterior import STRONG_LEFT, under_priors
+from glider.tools.own.posterior import STRONG_LEFT
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.sessions import Session, SessionRuns, split
 from glider.tools.own.watched import CERTAIN, Event, Watched

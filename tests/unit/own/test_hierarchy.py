@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,10 +23,11 @@ from glider.tools.own.decision import (
     with_usual,
 )
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
+from glider.tools.own.evidence import alone
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
 from glider.tools.own.identify import run_inflation
-from glider.tools.own.posterior import Engine, alone
-from glider.tools.own.runs_fit import left_out
+from glider.tools.own.posterior import Engine
+from glider.tools.own.runs_fit import LineSearch, left_out
 from glider.tools.own.watch import Event, Refit, Watch
 
 LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
@@ -93,7 +95,7 @@ def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
     )
     runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
     by, _, evidence, *_ = asked._best_sizes(runs, [], np.zeros(3))
-    assert by is getattr(asked, kind)
+    assert by.scatter is getattr(asked, kind).scatter
     each = [Pooled.of(one.marginal(runs), one.V).log_evidence() for one in (asked.together, asked.apart)]
     assert evidence == pytest.approx(np.logaddexp(*each) - np.log(2.0))
 
@@ -120,7 +122,12 @@ def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
     assert at.log_evidence() == pytest.approx(max(nat))
     assert mean == pytest.approx(at.mean()[places])
     assert sd**2 == pytest.approx(np.diag(at.covariance())[places])
-    assert by is asked.together or by is asked.apart
+    # what it is led by: the most probable sizes of labels that are as they have it
+    each = next(one for one in (asked.together, asked.apart) if one.scatter is by.scatter)
+    plain = [asked.variance(each.V, places, sizes, shared, 0.0)
+             for sizes in itertools.product(*[SIZES.tolist()] * len(places))]  # fmt: skip
+    pooled = Pooled.of(each.marginal(runs), each.V)
+    np.testing.assert_allclose(by.V, max(plain, key=pooled.log_evidence))
 
 
 def test_a_label_alone_gains_what_its_evidence_says():
@@ -189,6 +196,72 @@ def test_of_a_label_a_force_may_be_that_its_equations_do_not_have():
     V = asked.variance(np.zeros((3, 3)), [0], [2.0], np.array([5.0, 0.0, 0.0]), 0.2)
     assert np.diag(V) == pytest.approx([4.0, 0.0, 1.0])
     assert asked.variance(np.zeros((3, 3)), [2], [2.0], np.array([0.0, 0.0, 5.0]), 0.2)[2, 2] == pytest.approx(4.0)
+
+
+def about(at: np.ndarray, place: np.ndarray) -> Expansion:
+    """A run whose likelihood is a normal one about `place`, expanded elsewhere."""
+    one, off = run_at(place), at - place
+    return replace(one, at=at, value=float(off @ one.curvature @ off), slope=one.curvature @ off)
+
+
+class Flown(Engine):
+    """Stands for an engine whose runs are flown: their likelihood is a normal one about `places` (runs, 3), but by a
+    filter that is begun anew it is much worse where the first number is beyond `edge`."""
+
+    places, edge, off = np.zeros((1, 3)), np.inf, 0.0  # off: by which derivatives of another place do not hold
+
+    def _all_followed(self, own, columns, found):
+        there = [about(at, place) for at, place in zip(own, self.places, strict=True)]
+        return [replace(one, value=one.value + self.off) for one in there]
+
+    def expansions(self, own, columns, keep=False):
+        found = [about(at, place) for at, place in zip(own, self.places, strict=True)]
+        return [replace(one, value=one.value + 1e5 * max(0.0, one.at[0] - self.edge)) for one in found]
+
+
+def asked_of(places: np.ndarray, edge: float = np.inf, off: float = 0.0) -> Flown:
+    found = Flown(Columns(len(places)), healthy())
+    found.reach, found.places, found.edge, found.off = np.ones(3), places, edge, off
+    return found
+
+
+def test_a_fit_ends_where_its_posterior_rests():
+    """A force beside a label: where it is led, the label is as its equations have it."""
+    asked = asked_of(np.tile([5.0, 0.0, 2.0], (4, 1)))
+    found = asked.fit(("gain",))
+    again = asked.fit(("gain",), found)
+    assert again.shared == pytest.approx(found.shared, abs=1e-6)
+    assert again.evidence == pytest.approx(found.evidence, abs=1e-6)
+    by, *_ = asked._best_sizes(found.found, [0], found.shared)
+    assert found.shared[2] == pytest.approx(Pooled.of(by.marginal(found.found), by.V).mean()[2])
+    assert np.diag(by.V)[2] in np.diag(asked.together.V) + np.diag(asked.apart.V)
+
+
+def test_a_way_that_ends_worse_by_the_filter_there_is_taken_back():
+    places = np.tile([5.0, 0.0, 0.0], (4, 1))
+    assert asked_of(places).fit(("gain",)).shared[0] == pytest.approx(5.0, abs=0.05)
+    edged = asked_of(places, edge=1.5, off=1.0).fit(("gain",))
+    assert 0.5 < edged.shared[0] <= 1.5
+    assert edged.own[:, 0].max() <= 1.5
+
+
+class Searched(LineSearch):
+    """The same for a search along a line, of runs whose filters are kept or begun anew."""
+
+    def misfit(self, n, row):
+        kept = self.warm[n].filtered is not None
+        return about(row, self.warm[n].at + 5.0).value + (0.0 if kept else 1e5 * max(0.0, row[0] - 1.5))
+
+
+def test_a_step_into_a_place_that_is_worse_by_its_own_filter_is_searched_by_that():
+    at, limits = np.zeros(3), (np.full(3, -20.0), np.full(3, 20.0))
+    runs = [replace(about(at, at + 5.0), filtered=SimpleNamespace()) for _ in range(2)]
+    observer = SimpleNamespace(each=lambda asked, places: [asked(n) for n in places])
+    search = Searched(observer, LABELS, runs, np.zeros(3), 1.0, np.eye(3), limits, healthy().errors, 1.0)
+    values, own, gain = search.along(at, np.tile(at, (2, 1)), Pooled.of(runs, np.eye(3)))
+    assert gain > 0.0
+    assert 0.5 < values[0] <= 1.5
+    assert own[:, 0] == pytest.approx(values[0])
 
 
 def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():

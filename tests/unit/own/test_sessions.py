@@ -32,7 +32,7 @@ def test_each_number_has_its_own_spread_of_sessions():
     runs = [parabola(random, place + within * random.normal(size=K), 400.0)
             for place, count in zip(places, counts, strict=True) for _ in range(count)]  # fmt: skip
     total = np.hypot(within, between)
-    own, other = learn_sessions(runs, np.zeros((K, K)), total, counts)
+    own, other = learn_sessions(runs, np.zeros((K, K)), total, counts, np.zeros(K))
     assert own == pytest.approx([0.0, 0.3, 0.3], rel=0.15)
     assert other[0] == 0.0
     assert other[1] == pytest.approx(0.1, abs=0.06)
@@ -41,9 +41,9 @@ def test_each_number_has_its_own_spread_of_sessions():
 
 def test_one_session_leaves_what_is_usual():
     random, scatter = np.random.default_rng(4), np.array([0.0, 0.2, 0.4])
-    own, other = learn_sessions([parabola(random, np.zeros(K))], np.eye(K), scatter, [1])
+    own, other = learn_sessions([parabola(random, np.zeros(K))], np.eye(K), scatter, [1], np.array([1.0, 0.0, 0.0]))
     assert own is scatter
-    assert other == pytest.approx(np.sqrt(USUAL_SESSION_SHARE) * scatter)
+    assert other == pytest.approx([1.0, *np.sqrt(USUAL_SESSION_SHARE) * scatter[1:]])
 
 
 def test_another_session_is_known_by_what_the_reference_says_of_the_vehicle_alone():
