@@ -72,7 +72,7 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
             "the vehicle file is not identified: `glider identify` on healthy runs says what it leaves of them"
         )
     if verdict == "cause":
-        cautions += confounded(group, "these runs")
+        cautions += [*confounded(group, "these runs"), *worse(gap)]
     if vehicle.level and not vehicle.kernels.compiled:
         cautions.append(f"the model runs as {vehicle.kernels.said}")
     return {
@@ -90,6 +90,17 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
         ],
         "corrected": corrected,
     }  # fmt: skip
+
+
+def worse(gap: dict[str, Any]) -> list[str]:
+    """A caution, where the corrected vehicle predicts the runs worse than the one that was given."""
+    before, after = gap["before"]["total"], gap["after"]["total"]
+    if gap["shrinkage"]["value"] is None or after <= before:
+        return []
+    return [
+        f"with this cause in the model the gap grows, {before:.2f} -> {after:.2f} tolerances: "
+        "it explains these runs only beside other deviations that each of them has"
+    ]
 
 
 def _of_verdict(found: Posterior, verdict: str) -> Hypothesis:

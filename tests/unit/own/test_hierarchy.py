@@ -22,6 +22,7 @@ from glider.tools.own.decision import (
     usual_share,
     with_usual,
 )
+from glider.tools.own.diagnose import worse
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.evidence import alone
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
@@ -369,3 +370,10 @@ def test_an_effect_stands_beside_another_only_beyond_what_its_form_may_lack(size
     assert (both.weights[2] > 0.5) == beside
     ratio = both.weights[1] / both.weights[0]
     assert ratio == pytest.approx(np.divide(*decide(alone, one, np.ones(3), 4).weights[::-1]))
+
+
+@pytest.mark.parametrize(("after", "shrinkage", "cautions"), [(4.4, -0.36, 1), (0.8, 0.75, 0), (4.4, None, 0)])
+def test_a_cause_with_which_the_gap_grows_comes_with_a_caution(after, shrinkage, cautions):
+    found = worse({"before": {"total": 3.24}, "after": {"total": after}, "shrinkage": {"value": shrinkage}})
+    assert len(found) == cautions
+    assert not cautions or "3.24 -> 4.40" in found[0]
