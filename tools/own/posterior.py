@@ -37,7 +37,7 @@ NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS = 6, 3
 ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all others begin
 WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
-SHORTENED = 0.25  # of a step at most, after a way that ended worse
+SHORTER_WAY = 0.25  # of a step at most, after a way that ended worse
 STRONG, STRONG_LEFT, STRONG_ROWS = (
     (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
     1.5,
@@ -133,7 +133,7 @@ class Engine:
         for round_ in range(rounds):
             here = Place(shared, own, known or self.expansions(own, columns, keep=round_ < rounds - 1))
             if last is not None and here.cost(by, places) > last.cost(by, places) + 2.0 * AT_REST:
-                here, most = last, SHORTENED * most
+                here, most = last, SHORTER_WAY * most
             last, shared, own, found = here, here.shared, here.own, here.found
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
             values = replace(pooled, V=by.V).mean()
