@@ -99,7 +99,7 @@ def worse(gap: dict[str, Any]) -> list[str]:
         return []
     return [
         f"with this cause in the model the gap grows, {before:.2f} -> {after:.2f} tolerances: "
-        "it explains these runs only beside other deviations that each of them has"
+        "it explains these runs only together with deviations of each run's own"
     ]
 
 

@@ -199,7 +199,7 @@ class Engine:
     def _best_sizes(
         self, found: Sequence[Expansion], places: Sequence[int], shared: np.ndarray
     ) -> tuple[Deviations, Pooled, float, np.ndarray, np.ndarray]:
-        """The most probable deviations if labels are as they have it, runs pooled with the most probable prior, log
+        """Deviations with the most probable prior without form errors, runs pooled with the most probable of all, log
         evidence over all, sizes with their sd.
 
         Priors of the grid differ in a few variances, d: with W = (1 + V H)^-1, Q = (H W) and q = W' r at these,
