@@ -29,8 +29,10 @@ from glider.tools.own.neighbours import import_file, module_names, neighbours
 KERNELS, NEAR_KERNELS, CALLS = (
     Path(__file__).with_name(name) for name in ("kernels.py", "near_kernels.py", "calls.py")
 )
-NAMES = ("wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run",
-         "advance", "of_states", "of_noises", "transition", "transition_by_steps", "transition_by_rates")  # fmt: skip
+NAMES = (
+    "wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run",
+    "advance", "of_states", "of_noises", "of_own", "transition", "transition_by_steps", "transition_by_rates",
+)  # fmt: skip
 NEAR_NAMES = "follow_near", "fly_near", "advance_near", "differ"
 RUNS, NEAR = ("filter_run", "follow_run", "fly_run"), ("follow_near", "fly_near")
 OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}

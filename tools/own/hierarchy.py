@@ -23,6 +23,7 @@ PARTS = 1, 4  # of a window, in each of which errors may be the same
 LEVEL_ROUNDS, LEVEL_AT_REST = 30, 1e-9  # of Newton's method for log r
 UNSEEN_STEP = 1.0  # spreads: step of an effect that begins at a kink
 LEAST_REACH = 1e-4  # tolerances a spread: less is not seen
+NO_SCORES = np.zeros(0)
 LONGEST_MOVE, LONGEST_REACH = 4.0, 4.0  # spreads of a number a round; tolerances, where these are more
 
 
@@ -34,7 +35,7 @@ class Expansion(Parabola):
     samples: np.ndarray  # (y,)
     gap_squares: np.ndarray  # (y,) of the errors themselves, tolerances
     blocks: np.ndarray  # (PARTS, y + 1, k) sums over parts of windows of (J e)^2, by channel, and of all together
-    diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent
+    diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent; both empty where not asked for
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
     derivatives: np.ndarray | None = None  # (k, rows, y) of the independent errors, where they are kept
     filtered: Filtered | None = None  # the run's filter there, where it is kept
@@ -72,11 +73,11 @@ class ChannelErrors:
 
 def expand(
     observer: Observer, n: int, effects: Sequence[Effect], at: np.ndarray, healthy: ChannelErrors, horizon: float,
-    keep: bool = False, keep_filter: bool = False,
+    keep: bool = False, keep_filter: bool = False, scores: bool = True,
 ) -> Expansion:  # fmt: skip
     """Run n about the model at `at` (effects,) spreads: windows' errors made independent.
 
-    keep: the derivatives and the filter stay with it; keep_filter: the filter alone.
+    keep: the derivatives and the filter stay with it; keep_filter: the filter alone; scores: what `inflation` asks for.
     """
     base, declared = observer.point, observer.declared
     here = moved(declared, base, effects, at)
@@ -87,12 +88,8 @@ def expand(
     steps = np.where(at + steps > [one.high for one in effects], -steps, steps)
 
     def errors(places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        points = [here]
-        for k, size in zip(places, sizes, strict=True):
-            there = at.copy()
-            there[k] += size
-            points.append(moved(declared, base, effects, there))
-        return errors_near(observer, n, points, by, horizon)
+        there = [moved(declared, here, [effects[k]], np.array([size])) for k, size in zip(places, sizes, strict=True)]
+        return errors_near(observer, n, [here, *there], by, horizon)
 
     moving = np.array([k for k, one in enumerate(effects) if one.family != NOISE and k not in held], dtype=int)
     E = errors(moving, steps[moving])
@@ -112,23 +109,30 @@ def expand(
     gap_squares = (e**2).sum(axis=0)
     J, e = healthy.independent(n, J), healthy.independent(n, e)
     weight = 1.0 / healthy.inflation
-    weighted = (J * weight).reshape(len(effects), e.size)
     flat = J.reshape(len(effects), e.size)
-    score = J * (weight * e)  # (k, rows, y)
-    starts, ends = observer.windows(n, horizon)
-    rows = ends - starts - 1
-    first = np.cumsum(rows) - rows
-    blocks = []
+    weighted = (J * weight).reshape(flat.shape)
+    blocks, diagonal = _scores(J, e, weight, observer.windows(n, horizon)) if scores else (NO_SCORES, NO_SCORES)
+    return Expansion(
+        at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
+        np.where(seen, shape[0], 0), gap_squares, blocks, diagonal, reach,
+        J if keep else None, by if keep or keep_filter else None,
+    )  # fmt: skip
+
+
+def _scores(
+    J: np.ndarray, e: np.ndarray, weight: np.ndarray, windows: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """`blocks` and `diagonal` of an expansion with derivatives J (k, rows, y) of errors e (rows, y) that count by
+    weight (y,)."""
+    starts, ends = windows
+    rows, weighted = ends - starts - 1, weight * e
+    first, score, blocks = np.cumsum(rows) - rows, J * weighted, list[np.ndarray]()
     for parts in PARTS:
         cuts = np.unique((first[:, None] + rows[:, None] * np.arange(parts) // parts).ravel())
         sums = np.add.reduceat(score, cuts, axis=1)  # (k, blocks, y)
         blocks.append(np.concatenate([(sums**2).sum(axis=1).T, (sums.sum(axis=2) ** 2).sum(axis=1)[None]]))
-    diagonal = np.concatenate([(score**2).sum(axis=1).T, (score * J * e).sum(axis=(1, 2))[None]])
-    return Expansion(
-        at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
-        np.where(seen, shape[0], 0), gap_squares, np.array(blocks), diagonal, reach,
-        J if keep else None, by if keep or keep_filter else None,
-    )  # fmt: skip
+    by_channel = np.einsum("kry,kry->yk", score, score)
+    return np.array(blocks), np.concatenate([by_channel, np.einsum("kry,kry,ry->k", score, J, e)[None]])
 
 
 def room(reach: np.ndarray) -> np.ndarray:

@@ -372,13 +372,26 @@ def of_noises(motion, x, f, u, w, theta, h, density):
     return M
 
 
+def of_own(motion, x, f, u, w, theta, h, own):
+    """The same (n, o) by a run's own parameters."""
+    M, g = np.empty((len(x), own.shape[1])), np.empty(len(x))
+    for j in range(own.shape[1]):
+        place = int(own[0, j])
+        usual = theta[place]
+        theta[place] += own[2, j]
+        motion(pointer(g), pointer(x), pointer(u), pointer(w), pointer(theta), h)
+        M[:, j] = (g - f) * (h / own[2, j])
+        theta[place] = usual
+    return M
+
+
 def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
     """`transition` by the user's derivative: what Runge and Kutta's step makes of the system, linear as it is midway
     through a part, 1 + M + M^2 / 2 + M^3 / 6 + M^4 / 24, by forward differences there, part by part."""
     motion, stepped, dt, parts = by
     n, m, n_w, n_o, h = len(x), len(scales), len(w), own.shape[1], dt / parts
     of_all = n + n_w + n_o
-    E, one, f, g, x1 = np.eye(of_all), np.eye(of_all), np.empty(n), np.empty(n), x
+    E, one, f, x1 = np.eye(of_all), np.eye(of_all), np.empty(n), x
     for _ in range(parts):
         begun = x1
         x1 = advance(motion, stepped, begun, u, w, theta, h, 1)
@@ -386,13 +399,7 @@ def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
         motion(pointer(f), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
         M[:n, :n] = of_states(motion, middle, f, u, w, theta, h, kinds, scales)
         M[:n, n : n + n_w] = of_noises(motion, middle, f, u, w, theta, h, density)
-        for j in range(n_o):
-            place = int(own[0, j])
-            usual = theta[place]
-            theta[place] += own[2, j]
-            motion(pointer(g), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
-            M[:n, n + n_w + j] = (g - f) * (h / own[2, j])
-            theta[place] = usual
+        M[:n, n + n_w :] = of_own(motion, middle, f, u, w, theta, h, own)
         E = (one + M @ (one + M @ (one + M @ (one + M / 4.0) / 3.0) / 2.0)) @ E
     x1 = normalised(x1, kinds)
     later, d = E[:n, :n].copy(), np.zeros(m)

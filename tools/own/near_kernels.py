@@ -10,6 +10,7 @@ from glider.tools.own.kernels import (
     difference,
     normalised,
     of_noises,
+    of_own,
     of_states,
     plus,
     pointer,
@@ -36,7 +37,7 @@ def follow_near(
             for k in range(models):
                 u[k] = U[which[k, 0], row - 1, 0]
                 push_of(push[which[k, 1], row - 1], ports, a[k], w[k])
-            X = advance_near(motion, X, u, w, theta, dt, parts, kinds, scales, density)
+            X = advance_near(motion, X, u, w, theta, own, dt, parts, kinds, scales, density)
             for k in range(n_p):
                 decay = np.exp(-dt / ports[k, 2])
                 c, s = decay * np.cos(ports[k, 1] * dt), decay * np.sin(ports[k, 1] * dt)
@@ -79,25 +80,29 @@ def fly_near(
             if row > first:
                 for k in range(models):
                     u[k], w[k] = U[which[k, 0], row - 1, 0], push[which[k, 1], row - 1]
-                x = advance_near(motion, x, u, w, theta, T[row] - T[row - 1], parts, kinds, scales, density)
+                x = advance_near(motion, x, u, w, theta, own, T[row] - T[row - 1], parts, kinds, scales, density)
             for k in range(models):
                 reads(pointer(h), pointer(x[k]), pointer(U[which[k, 0], row, 1]), pointer(theta[k]))
                 out[k, row] = read(h, T[row], row - first, when, lagged[k], history[k], angles, S[k])
                 out[k, row] += S[k, 2] * (T[first] - T[0])
 
 
-def advance_near(motion, X, u, w, theta, dt, parts, kinds, scales, density):
+def advance_near(motion, X, u, w, theta, own, dt, parts, kinds, scales, density):
     """States (models, n) after dt of a model, which comes first, and of others near it; each has its u, w and theta.
 
     The first is advanced by Runge and Kutta's steps. The others' distances d from it follow d' = J d + s, with the
-    first's J midway through a part, and s by which their rates differ from its there: of noises to first order, of
-    other numbers as they are.
+    first's J midway through a part, and s by which their rates differ from its there: of noises and of a run's own
+    parameters to first order, of other numbers as they are.
     """
-    models, n = X.shape
+    models, n, n_o = X.shape[0], X.shape[1], own.shape[1]
     h, f, g, one = dt / parts, np.empty(n), np.empty(n), np.eye(n)
-    pushed, driven = np.zeros((models, n)), np.zeros(models, dtype=np.bool_)
+    pushed, driven, numbers = np.zeros((models, n)), np.zeros(models, dtype=np.bool_), theta.copy()
+    beside = np.zeros((models, n_o))
+    for j in range(n_o):
+        place = int(own[0, j])
+        beside[:, j], numbers[:, place] = theta[:, place] - theta[0, place], theta[0, place]
     for k in range(1, models):
-        driven[k] = differ(u[k], u[0]) or differ(theta[k], theta[0])
+        driven[k] = differ(u[k], u[0]) or differ(numbers[k], theta[0])
     for _ in range(parts):
         x = X[0].copy()
         x1 = advance(motion, False, x, u[0], w[0], theta[0], h, 1)
@@ -105,9 +110,10 @@ def advance_near(motion, X, u, w, theta, dt, parts, kinds, scales, density):
         motion(pointer(f), pointer(middle), pointer(u[0]), pointer(w0), pointer(theta[0]), h)
         M = of_states(motion, middle, f, u[0], w0, theta[0], h, kinds, scales)
         pushed[:] = (w - w[0]) @ of_noises(motion, middle, f, u[0], w0, theta[0], h, density).T
+        pushed += beside @ of_own(motion, middle, f, u[0], w0, theta[0], h, own).T
         for k in range(1, models):
             if driven[k]:
-                motion(pointer(g), pointer(middle), pointer(u[k]), pointer(w0), pointer(theta[k]), h)
+                motion(pointer(g), pointer(middle), pointer(u[k]), pointer(w0), pointer(numbers[k]), h)
                 for j in range(n):
                     pushed[k, j] += h * (g[j] - f[j])
         by = one + M @ (one + M @ (one + M / 4.0) / 3.0) / 2.0

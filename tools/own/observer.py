@@ -2,6 +2,7 @@
 
 import contextlib
 import copy
+import itertools
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +29,7 @@ NO_POINT = ModelPoint(
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
-MOST_KEPT = 10_000  # first readings, states that runs begin in
+MOST_KEPT = 10_000  # states that runs begin in
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
 
 
@@ -57,7 +58,7 @@ class Observer:
     _begun: dict[tuple[int, int, bytes, bytes], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _windows: dict[tuple[int, float], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     _time_constant: float | None = None  # s, once it is asked for
-    _first: dict[tuple[int, bytes], dict[str, float]] = field(default_factory=dict)
+    _first: dict[int, list[tuple[float, float]]] = field(default_factory=dict)  # first value and rate as they are read
 
     def __post_init__(self) -> None:
         declared = self.vehicle.declared
@@ -91,30 +92,34 @@ class Observer:
 
     def first_readings(self, n: int, point: ModelPoint) -> dict[str, float]:
         """First value and rate of every output of run n, as the sensors' errors have it; NaN: none."""
-        run, key = self.runs[n], (n, point.reading[:2].tobytes())
-        if key in self._first:
-            return dict(self._first[key])
+        if n not in self._first:
+            self._first[n] = [self._first_read(n, k) for k in range(len(self.declared.outputs))]
         found: dict[str, float] = {}
-        early = int(np.searchsorted(run.t, run.t[0] + FIRST_SECONDS, side="right"))
-        for k, one in enumerate(self.declared.outputs):
-            gain, bias = point.reading[0, k], point.reading[1, k]
-            read = np.flatnonzero(np.isfinite(run.outputs[:, k]))
-            seen = read[: max(FIRST_READINGS, int(np.searchsorted(read, early)))]
-            values = (run.outputs[seen, k] - bias) / (gain or 1.0)  # a dead sensor is of no use: as it reads
-            if one.angle:
-                values = np.unwrap(values)
-            known = self.declared.start.get(one.name)
-            found[one.name] = known[0] if known else (float(values[0]) if len(seen) else np.nan)
-            when = run.t[seen] - run.t[0]
-            sloped = len(seen) >= FIRST_READINGS and np.ptp(when) > 0.0
-            found[f"{one.name}_rate"] = float(np.polyfit(when, values, 1)[0]) if sloped else np.nan
-        if len(self._first) < MOST_KEPT:
-            self._first[key] = dict(found)
+        for one, gain, bias, (value, rate) in zip(
+            self.declared.outputs, point.reading[0], point.reading[1], self._first[n], strict=True
+        ):
+            times, known = gain or 1.0, self.declared.start.get(one.name)  # a dead sensor is of no use: as it reads
+            found[one.name] = known[0] if known else float((value - bias) / times)
+            found[f"{one.name}_rate"] = float(rate / times)
         return found
+
+    def _first_read(self, n: int, k: int) -> tuple[float, float]:
+        """First value and rate that output k of run n is read with."""
+        run = self.runs[n]
+        early = int(np.searchsorted(run.t, run.t[0] + FIRST_SECONDS, side="right"))
+        read = np.flatnonzero(np.isfinite(run.outputs[:, k]))
+        seen = read[: max(FIRST_READINGS, int(np.searchsorted(read, early)))]
+        values, when = run.outputs[seen, k], run.t[seen] - run.t[0]
+        if self.declared.outputs[k].angle:
+            values = np.unwrap(values)
+        sloped = len(seen) >= FIRST_READINGS and np.ptp(when) > 0.0
+        return (float(values[0]) if len(seen) else np.nan, float(np.polyfit(when, values, 1)[0]) if sloped else np.nan)
 
     def start(self, n: int, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
         """Initial state (states,) and its covariance (errors, errors) of a run."""
-        key = (n, self.starts[n], point.theta.tobytes(), point.reading[:2].tobytes())
+        # the model's numbers are asked for where [start] says what outputs are
+        numbers = point.theta.tobytes() if self.declared.start else b""
+        key = (n, self.starts[n], numbers, point.reading[:2].tobytes())
         found = self._begun.get(key)
         if found is None:
             if len(self._begun) >= MOST_KEPT:
@@ -245,6 +250,12 @@ class Observer:
         self._windows[n, horizon] = starts, ends
         return starts, ends
 
+    def _scored(self, n: int, horizon: float) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of run n that windows are scored by, and where among them each window begins (windows + 1,)."""
+        starts, ends = self.windows(n, horizon)
+        rows = np.concatenate([np.arange(a + 1, b) for a, b in zip(starts, ends, strict=True)])
+        return rows, np.append(0, np.cumsum(ends - starts - 1))
+
     def predict(self, n: int, point: ModelPoint, horizon: float, states: np.ndarray, beside=0.0) -> np.ndarray:
         """Outputs (rows, outputs) of run n, window by window open loop from the state behind each warm-up; NaN else.
 
@@ -269,20 +280,18 @@ class Observer:
 
         wrapped: angles modulo 2 pi; else turns are counted from a window's start on, so that errors are smooth.
         """
-        parts = [np.arange(a + 1, b) for a, b in zip(*self.windows(n, horizon), strict=True)]
-        rows = np.concatenate(parts)
+        rows, cuts = self._scored(n, horizon)
         measured, predicted = self.runs[n].outputs[rows], predicted[..., rows, :]
         error = measured - predicted
         error[..., self.angles] = names.wrap(error[..., self.angles])
-        ends = np.cumsum([len(part) for part in parts])
         for k in np.flatnonzero(self.angles) if not wrapped else ():
-            for a, b in zip(ends - [len(part) for part in parts], ends, strict=True):
-                seen = a + np.flatnonzero(np.isfinite(measured[a:b, k]))
-                turned = np.any(np.abs(np.diff(error[..., seen, k])) > np.pi, axis=-1)
-                if turned.any():
-                    error[..., seen, k] = np.where(
-                        turned[..., None], np.unwrap(error[..., seen, k]), error[..., seen, k]
-                    )
+            seen = np.flatnonzero(np.isfinite(measured[:, k]))
+            turned = np.any(np.abs(np.diff(error[..., seen, k])) > np.pi, axis=tuple(range(error.ndim - 2)))
+            after = seen[1:][turned]
+            for a, b in itertools.pairwise(cuts) if len(after) else ():
+                if np.any((after > a) & (after < b)):
+                    inside = seen[(seen >= a) & (seen < b)]
+                    error[..., inside, k] = np.unwrap(error[..., inside, k])
         lost = np.isnan(predicted).all(axis=-1)
         if lost.any():
             error[lost] = np.where(np.isnan(measured), np.nan, LOST * self.tolerances)[np.nonzero(lost)[-1]]
@@ -336,12 +345,17 @@ class Observer:
         workers = min(len(every), threads) if compiled and alone else 1
         if workers < 2:
             return [flown(each) for each in every]
-        found: list[Any] = [None] * len(every)
+        found, left = [None] * len(every), iter(range(len(every)))
+
+        def fly() -> None:
+            for k in left:  # what is next is taken by whichever thread is free
+                found[k] = flown(every[k])
+
         with ThreadPoolExecutor(workers - 1) as pool:
-            others = [pool.submit(lambda k: [flown(each) for each in every[k::workers]], k) for k in range(1, workers)]
-            found[::workers] = [flown(each) for each in every[::workers]]
-            for k, one in enumerate(others):
-                found[k + 1 :: workers] = one.result()
+            others = [pool.submit(fly) for _ in range(1, workers)]
+            fly()
+            for one in others:
+                one.result()
         return found
 
     @property

@@ -67,13 +67,13 @@ def _weights(points: tuple[tuple[float, ...], ...], z: np.ndarray) -> np.ndarray
     """L^-1 k(Z, z), (points,)."""
     if not points:
         return _NONE
-    return np.linalg.solve(_factor(points), _kernel(np.array(points), z[None])[:, 0])
+    return _inverse_factor(points) @ _kernel(np.array(points), z[None])[:, 0]
 
 
 @lru_cache(maxsize=64)
-def _factor(points: tuple[tuple[float, ...], ...]) -> np.ndarray:
+def _inverse_factor(points: tuple[tuple[float, ...], ...]) -> np.ndarray:
     Z = np.array(points)
-    return np.linalg.cholesky(_kernel(Z, Z) + ROUNDING * np.eye(len(Z)))
+    return np.linalg.inv(np.linalg.cholesky(_kernel(Z, Z) + ROUNDING * np.eye(len(Z))))
 
 
 def _kernel(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -36,6 +36,7 @@ from glider.tools.own.observer import Observer
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS = 6, 3
 ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all others begin
+BEHIND = 8.0  # nat that the best is ahead of a hypothesis that is not led on
 WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
 SHORTER_WAY = 0.25  # of a step at most, after a way that ended worse
 STRONG, STRONG_LEFT, STRONG_ROWS = (
@@ -63,6 +64,7 @@ class Engine:
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
         self.reach = np.zeros(self.k)
         self.level = RunLevel(healthy.errors, healthy.eta, healthy.level_scatter)
+        self.ahead = -np.inf  # log evidence of the best so far
 
     def columns(self, places: Sequence[int] = ()) -> np.ndarray:
         """Numbers that every hypothesis leaves open, and labels at some places."""
@@ -81,7 +83,9 @@ class Engine:
         keep, keep_filter: as in `expand`; leveled: at its own level of errors.
         """
         chosen, observer = [self.healthy.effects[k] for k in columns], self._observer_at(own, columns)
-        one = expand(observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep, keep_filter)
+        one = expand(
+            observer, n, chosen, own[columns], self.healthy.errors, self.horizon, keep, keep_filter, scores=False
+        )
         one = one.tempered(self.healthy.eta)
         return self._widened(self.level.of(one) if leveled else one, columns, own)
 
@@ -121,7 +125,7 @@ class Engine:
 
         On the way the derivatives of the last expansion serve. A place is expanded anew where a way along them ends,
         unless it gained what they had said: then they hold there too. Where it is worse by its own filter, the way is
-        taken back, and the next is shorter.
+        taken back, and the next is shorter. What stays far behind the best even if it gains as much again is left.
         """
         places = self.healthy.at(labels)
         columns = self.columns(places)
@@ -129,11 +133,12 @@ class Engine:
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
         rounds = ROUNDS if labels else FIRST_ROUNDS
         known = [one.only(columns) for one in begin.found] if begin is not None and begin.everywhere else []
-        most, by, last = room(self.reach), self.together, None
+        most, by, last, odds = room(self.reach), self.together, None, log_prior(self.healthy, labels)
         for round_ in range(rounds):
             here = Place(shared, own, known or self.expansions(own, columns, keep=round_ < rounds - 1))
             if last is not None and here.cost(by, places) > last.cost(by, places) + 2.0 * AT_REST:
-                here, most = last, SHORTER_WAY * most
+                way = np.abs(np.concatenate([[here.shared - last.shared], here.own - last.own])).max(axis=0)
+                here, most = last, SHORTER_WAY * np.minimum(most, way)
             last, shared, own, found = here, here.shared, here.own, here.found
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
             values = replace(pooled, V=by.V).mean()
@@ -144,6 +149,8 @@ class Engine:
                 shared, own = np.clip(values, self.low, self.high), np.clip(led, self.low, self.high)
                 break
             gained = 0.0
+            if round_ and evidence + odds + 0.5 * predicted_gain < self.ahead - BEHIND:
+                break
             if round_ < rounds - 1:
                 shared, own, gained, there = self._along(here, by, places, most)
                 known = there if abs(gained - predicted_gain) < AT_REST else []
@@ -154,7 +161,8 @@ class Engine:
         if every:
             found = self.expansions(own, np.arange(self.k), keep=True)
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-        evidence += log_prior(self.healthy, labels)
+        evidence += odds
+        self.ahead = max(self.ahead, evidence)
         fitted = Hypothesis(labels, evidence, shared[places], sd, shared, own, left, 0.0, found, everywhere=True)
         if not every:
             fitted.forget()
