@@ -39,11 +39,8 @@ ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all 
 BEHIND = 8.0  # nat that the best is ahead of a hypothesis that is not led on
 WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
 SHORTER_WAY = 0.25  # of a step at most, after a way that ended worse
-STRONG, STRONG_LEFT, STRONG_ROWS = (
-    (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
-    1.5,
-    1_500,
-)  # tolerances; times healthy; rows looked at
+STRONG = 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0  # tolerances
+STRONG_LEFT, STRONG_ROWS, STRONG_WORSE = 1.5, 1_500, 2  # times healthy; rows looked at; larger sizes each of them worse
 
 
 class Engine:
@@ -291,23 +288,33 @@ class Engine:
                 break
             chosen.append(n)
             rows += len(observer.runs[n].t)
-        sizes = [(k, sign * size / self.reach[k]) for k in range(self.k)
-                 if self.reach[k] > LEAST_REACH and self.candidate[k]
-                 for size in STRONG for sign in (1.0, -1.0)]  # fmt: skip
-        sizes = [(k, size) for k, size in sizes if self.low[k] <= size <= self.high[k]]
-        value = np.zeros(len(sizes))
-        for n in chosen:
-            by = observer.filter(n, observer.point)
-            points = []
-            for k, size in sizes:
-                at = np.zeros(self.k)
-                at[k] = size
-                points.append(moved(observer.declared, observer.point, healthy.effects, at))
-            value += healthy.errors.misfit(n, observer.residuals(n, points, by, self.horizon))
-        found: dict[int, tuple[float, float]] = {}
-        for (k, size), squares in zip(sizes, value, strict=True):
-            if k not in found or squares < found[k][0]:
-                found[k] = (float(squares), size)
+        flown = {n: observer.filter(n, observer.point) for n in chosen}
+
+        def squares(sizes: Sequence[tuple[int, float]]) -> np.ndarray:
+            points = [moved(observer.declared, observer.point, healthy.effects[k : k + 1], np.array([size]))
+                      for k, size in sizes]  # fmt: skip
+            of = [healthy.errors.misfit(n, observer.residuals(n, points, by, self.horizon)) for n, by in flown.items()]
+            return np.sum(of, axis=0)
+
+        begun = float(squares([(0, 0.0)])[0])
+        found, ways = dict[int, tuple[float, float]](), {
+            (k, sign): (0, begun) for k in range(self.k) for sign in (1.0, -1.0)
+            if self.reach[k] > LEAST_REACH and self.candidate[k]
+        }  # fmt: skip
+        for strong in STRONG:
+            sizes = {(k, sign): sign * strong / self.reach[k] for k, sign in ways}
+            sizes = {way: size for way, size in sizes.items() if self.low[way[0]] <= size <= self.high[way[0]]}
+            left = squares([(k, size) for (k, _), size in sizes.items()]) if sizes else np.zeros(0)
+            on = dict[tuple[int, float], tuple[int, float]]()
+            for ((k, sign), size), here in zip(sizes.items(), left.tolist(), strict=True):
+                worse, before = ways[k, sign]
+                if k not in found or here < found[k][0]:
+                    found[k] = (here, size)
+                if here <= before:
+                    on[k, sign] = 0, here
+                elif worse + 1 < STRONG_WORSE:
+                    on[k, sign] = worse + 1, here
+            ways = on
         return [(k, size) for k, (_, size) in sorted(found.items(), key=lambda one: one[1][0])]
 
     def strong_starts(self) -> list[tuple[str, Hypothesis]]:
