@@ -74,7 +74,7 @@ def _whitenings(observer: Observer, table: IdentifiedTable) -> list[Whitening]:
                     np.array([table.force_variance.get(one.name, 1.0) for one in declared.noises]),
                     np.array([table.held_force_variance.get(one.name, 1.0) for one in declared.noises]),
                     table.start_variance)  # fmt: skip
-    return observer.each(lambda n: Whitening(patterns(observer, n, observer.horizon), by), range(len(observer.runs)))
+    return observer.each_run(lambda n: Whitening(patterns(observer, n, observer.horizon), by))
 
 
 def effect_point(observer: Observer, healthy: Healthy, labels: Sequence[str], sizes: np.ndarray) -> ModelPoint:

@@ -336,6 +336,12 @@ class Observer:
         """Whether the model is a derivative, so that others near it are flown beside it."""
         return self.vehicle.level > 0 and not hasattr(self.vehicle.model, "step")
 
+    def each_run(self, flown: Callable[[int], Any]) -> list[Any]:
+        """Every run flown, the longest first: threads end together."""
+        order = sorted(range(len(self.runs)), key=lambda n: -len(self.runs[n].t))
+        found = dict(zip(order, self.each(flown, order), strict=True))
+        return [found[n] for n in range(len(self.runs))]
+
     def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
         """Flights side by side, on as many threads as there are processors, where they are compiled; one after the
         other on such a thread."""

@@ -32,6 +32,7 @@ from glider.tools.own.evidence import Place, alone, size_evidence, under_priors
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room
 from glider.tools.own.observer import Observer
+from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS = 6, 3
@@ -39,8 +40,6 @@ ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all 
 BEHIND = 8.0  # nat that the best is ahead of a hypothesis that is not led on
 WAY, AT_REST = 4, 0.25  # steps along the derivatives of one expansion; nat of the posterior that one has to gain
 SHORTER_WAY = 0.25  # of a step at most, after a way that ended worse
-STRONG = 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0  # tolerances
-STRONG_LEFT, STRONG_ROWS, STRONG_WORSE = 1.5, 1_500, 2  # times healthy; rows looked at; larger sizes each of them worse
 
 
 class Engine:
@@ -69,7 +68,7 @@ class Engine:
 
     def expansions(self, own: np.ndarray, columns: np.ndarray, keep: bool = False) -> list[Expansion]:
         """Every run about its values (runs, k) in some columns, tempered; the others' rows are 0."""
-        return self.observer.each(lambda n: self.expansion_of(n, own[n], columns, keep), range(self.count))
+        return self.observer.each_run(lambda n: self.expansion_of(n, own[n], columns, keep))
 
     def expansion_of(
         self, n: int, own: np.ndarray, columns: np.ndarray, keep: bool = False, leveled: bool = True,
@@ -97,7 +96,7 @@ class Engine:
         return replace(one, at=own.copy(), value=there.value, slope=slope, squares=there.squares)
 
     def _all_followed(self, own: np.ndarray, columns: np.ndarray, found: Sequence[Expansion]) -> list[Expansion]:
-        return self.observer.each(lambda n: self.followed(n, own[n], columns, found[n]), range(len(found)))
+        return self.observer.each_run(lambda n: self.followed(n, own[n], columns, found[n]))
 
     def _observer_at(self, own: np.ndarray, columns: np.ndarray) -> Observer:
         """The observer about a run's values in all other columns."""
@@ -276,51 +275,10 @@ class Engine:
             starts.append((self.healthy.effects[k].label, replace(begin, shared=shared, own=own, everywhere=False)))
         return starts
 
-    def strong_sizes(self, among: Sequence[int]) -> list[tuple[int, float]]:
-        """Labels at the size that alone explains most of some runs, best first.
-
-        Where a strong change leads no parabola goes: every label is flown at sizes over the whole range.
-        """
-        healthy, observer = self.healthy, self.observer
-        chosen, rows = list[int](), 0
-        for n in sorted(among, key=lambda n: len(observer.runs[n].t)):
-            if chosen and rows + len(observer.runs[n].t) > STRONG_ROWS:
-                break
-            chosen.append(n)
-            rows += len(observer.runs[n].t)
-        flown = {n: observer.filter(n, observer.point) for n in chosen}
-
-        def squares(sizes: Sequence[tuple[int, float]]) -> np.ndarray:
-            points = [moved(observer.declared, observer.point, healthy.effects[k : k + 1], np.array([size]))
-                      for k, size in sizes]  # fmt: skip
-            of = [healthy.errors.misfit(n, observer.residuals(n, points, by, self.horizon)) for n, by in flown.items()]
-            return np.sum(of, axis=0)
-
-        begun = float(squares([(0, 0.0)])[0])
-        found, ways = dict[int, tuple[float, float]](), {
-            (k, sign): (0, begun) for k in range(self.k) for sign in (1.0, -1.0)
-            if self.reach[k] > LEAST_REACH and self.candidate[k]
-        }  # fmt: skip
-        for strong in STRONG:
-            sizes = {(k, sign): sign * strong / self.reach[k] for k, sign in ways}
-            sizes = {way: size for way, size in sizes.items() if self.low[way[0]] <= size <= self.high[way[0]]}
-            left = squares([(k, size) for (k, _), size in sizes.items()]) if sizes else np.zeros(0)
-            on = dict[tuple[int, float], tuple[int, float]]()
-            for ((k, sign), size), here in zip(sizes.items(), left.tolist(), strict=True):
-                worse, before = ways[k, sign]
-                if k not in found or here < found[k][0]:
-                    found[k] = (here, size)
-                if here <= before:
-                    on[k, sign] = 0, here
-                elif worse + 1 < STRONG_WORSE:
-                    on[k, sign] = worse + 1, here
-            ways = on
-        return [(k, size) for k, (_, size) in sorted(found.items(), key=lambda one: one[1][0])]
-
     def strong_starts(self) -> list[tuple[str, Hypothesis]]:
         """Hypotheses of single labels that begin there."""
         starts = []
-        for k, size in self.strong_sizes(range(self.count))[:BEAM]:
+        for k, size in strong_sizes(self.observer, self.healthy, self.reach, range(self.count))[:BEAM]:
             shared = np.zeros(self.k)
             shared[k] = size
             own = np.tile(shared, (self.count, 1))
@@ -386,12 +344,14 @@ class Engine:
         usual, found = self.healthy.noise_gain, list[Hypothesis]()
         noises = [one for one in self.healthy.effects if one.family == NOISE] if usual else []
         for begin in beside if noises else ():
-            runs, flown = list[Expansion](), list[Responses]()
             columns = self.columns(self.healthy.at(begin.labels))
-            for n in range(self.count):
+
+            def of_run(n: int, begin=begin, columns=columns) -> tuple[Expansion, Responses]:
                 point = moved(self.observer.declared, self.observer.point, self.healthy.effects, begin.own[n])
-                flown.append(responses(self.observer.about(point), n, self.horizon, self.healthy.errors))
-                runs.append(self.expansion_of(n, begin.own[n], columns, keep=True, leveled=False))
+                return (self.expansion_of(n, begin.own[n], columns, keep=True, leveled=False),
+                        responses(self.observer.about(point), n, self.horizon, self.healthy.errors))  # fmt: skip
+
+            runs, flown = map(list, zip(*self.observer.each_run(of_run), strict=True))
             tried: list[tuple[float, str, NoisyWindows]] = []
             for place, one in enumerate(noises):
                 for block in blocks_of(place):

@@ -43,9 +43,8 @@ class RunsFit:
     def expansions(self, keep: bool = False, keep_filter: bool = False) -> list[Expansion]:
         """Every run about its own values; keep, keep_filter: as in `expand`."""
         observer, horizon = self.observer, self.observer.horizon
-        return observer.each(
-            lambda n: expand(observer, n, self.nuisance, self.own[n], self.errors, horizon, keep, keep_filter),
-            range(len(self.own)),
+        return observer.each_run(
+            lambda n: expand(observer, n, self.nuisance, self.own[n], self.errors, horizon, keep, keep_filter)
         )
 
     def led_at_levels(self, say: Callable[[str], None]) -> "RunsFit":

@@ -30,9 +30,9 @@ from glider.tools.own.evidence import under_priors
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observers import observer_of
-from glider.tools.own.posterior import STRONG_LEFT
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.sessions import Session, SessionRuns, split
+from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 from glider.tools.own.watched import CERTAIN, Event, Watched
 from glider.tools.own.watched_runs import Warm, WatchedRuns
 
@@ -182,7 +182,7 @@ class Watch(WatchedRuns):
         for one in places:
             starts, runs = {int(k): 0.0 for k in np.argsort(one.scores)[::-1][:REFITTED]}, range(*one.span)
             if np.sqrt(np.mean([self.left(n) for n in runs])) > STRONG_LEFT:
-                starts |= dict(self.strong_sizes(runs)[:REFITTED])
+                starts |= dict(strong_sizes(self.observer, self.healthy, self.reach, runs)[:REFITTED])
             add(one, starts)
         while found and (leading := max(found.values(), key=lambda one: one.score)) is not best:
             if leading.score + np.log(self.named) + self.change_odds < 0.0:
