@@ -8,7 +8,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
 from glider.tools.own.effects import ModelPoint, driven_inputs
 from glider.tools.own.load import called
-from glider.tools.own.observer import WARM_UP, WARM_UP_SHARE, Filtered, Observer
+from glider.tools.own.observer import NO_LINEAR, WARM_UP, WARM_UP_SHARE, Filtered, Observer
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.steps import HORIZON
 from glider.tools.own.trends import Trend, trend_of
@@ -43,9 +43,9 @@ class BlackBox(Observer):
     def horizon(self) -> float:
         return float(self.declared.horizon or HORIZON[1])
 
-    def filter(self, n: int, point: ModelPoint, covariances: bool = False) -> Filtered:
+    def filter(self, n: int, point: ModelPoint, covariances: bool = False, linear: bool = False) -> Filtered:
         rows = len(self.runs[n].t)
-        return Filtered(0.0, 0.0, 1, np.zeros((rows, 0, 0)), np.zeros((rows, 0)), np.zeros((0, 0, 0)))
+        return Filtered(0.0, 0.0, 1, np.zeros((rows, 0, 0)), np.zeros((rows, 0)), np.zeros((0, 0, 0)), NO_LINEAR)
 
     def follow(self, n: int, point: ModelPoint, by: Filtered, rows: int | None = None) -> np.ndarray:
         return by.states

@@ -31,7 +31,8 @@ KERNELS, NEAR_KERNELS, CALLS = (
 )
 NAMES = (
     "wrap", "plus", "minus", "normalised", "difference", "read", "push_of", "filter_run", "follow_run", "fly_run",
-    "advance", "of_states", "of_noises", "of_own", "transition", "transition_by_steps", "transition_by_rates",
+    "advance", "of_states", "of_noises", "of_own", "linear_part", "transition", "transition_by_steps",
+    "transition_by_rates",
 )  # fmt: skip
 NEAR_NAMES = "follow_near", "fly_near", "advance_near", "differ"
 RUNS, NEAR = ("filter_run", "follow_run", "fly_run"), ("follow_near", "fly_near")

@@ -15,7 +15,7 @@ from glider.tools.inference.pooled import Parabola
 from glider.tools.own.declare import Declaration
 from glider.tools.own.effects import FORM, NOISE, PUSH, Effect, driven_inputs, moved
 from glider.tools.own.near import errors_near
-from glider.tools.own.observer import Filtered, Observer
+from glider.tools.own.observer import NO_LINEAR, Filtered, Observer
 from glider.tools.own.operating_points import point_weights
 
 STEP, LONG_STEP, SHORTENED = 0.1, 3.0, 0.5  # spreads; rms errors that a step may move, and to what it is shortened
@@ -81,7 +81,7 @@ def expand(
     """
     base, declared = observer.point, observer.declared
     here = moved(declared, base, effects, at)
-    by = observer.filter(n, here)
+    by = observer.filter(n, here, linear=True)
     held = multiples_of_pushes(declared, effects, driven_inputs(observer.runs[n], declared, here))
     begins = np.array([one.one_sided and abs(x) < STEP for one, x in zip(effects, at, strict=True)], dtype=bool)
     steps = np.where(begins, UNSEEN_STEP, STEP)
@@ -115,7 +115,7 @@ def expand(
     return Expansion(
         at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
         np.where(seen, shape[0], 0), gap_squares, blocks, diagonal, reach,
-        J if keep else None, by if keep or keep_filter else None,
+        J if keep else None, replace(by, linear=NO_LINEAR) if keep or keep_filter else None,
     )  # fmt: skip
 
 

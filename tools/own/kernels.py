@@ -127,7 +127,8 @@ def filter_run(
     P0 (m, m); own (3, o): parameters that are a number of each run, estimated along it: place in theta, 1 sigma,
     difference step; S (5, y) of `read`; push (r, w); density (w,); R (y,) variances; parts: steps in which a row's
     step is taken. Into keep: gains (r, m + 2 ports + o, y), states and own parameters (r, n + o) after each row, and,
-    where there is room, the covariance (r, m + 2 ports + o, the same) of their errors.
+    where there is room, the covariance (r, m + 2 ports + o, the same) of their errors and `linear_part` of every part
+    (r, parts, n, n + w + o + 3) before it.
     Returns value, squares, samples.
     """
     n_y, n_w, n_p, n_o, n = Y.shape[1], push.shape[1], ports.shape[0], own.shape[1], len(x0)
@@ -135,7 +136,8 @@ def filter_run(
     full = m + 2 * n_p + n_o
     at_own = m + 2 * n_p
     theta = theta.copy()
-    gains, states, covariances = keep
+    gains, states, covariances, linear = keep
+    unkept = np.empty((parts, n, n + n_w + n_o + 3))
     P = np.zeros((full, full))
     P[:m, :m] = P0
     a = np.zeros(2 * n_p)
@@ -154,7 +156,8 @@ def filter_run(
             push_of(push[row - 1], ports, a, w)
             F[:, :], G[:, :] = 0.0, 0.0
             by = motion, stepped, dt, parts
-            x1 = transition(by, x, U[row - 1, 0], w, theta, kinds, scales, density, own, F, G)
+            along = linear[row] if row < len(linear) else unkept
+            x1 = transition(by, x, U[row - 1, 0], w, theta, kinds, scales, density, own, F, G, along)
             for j in range(n_o):
                 F[at_own + j, at_own + j] = 1.0
             for k in range(n_p):
@@ -311,12 +314,13 @@ def advance(motion, stepped, x, u, w, theta, dt, parts):
     return x
 
 
-def transition(by, x, u, w, theta, kinds, scales, density, own, F, G):
+def transition(by, x, u, w, theta, kinds, scales, density, own, F, G, along):
     """The state after dt, and what it has of an error of x, into F[:m, :m], of the noises, into G[:m], and of a run's
-    own parameters, into the last columns of F[:m]. by: motion, stepped, dt, parts."""
+    own parameters, into the last columns of F[:m]. by: motion, stepped, dt, parts; along (parts, ...): `linear_part` of
+    each, of a model that gives rates."""
     if by[1]:
         return transition_by_steps(by, x, u, w, theta, kinds, scales, density, own, F, G)
-    return transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G)
+    return transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G, along)
 
 
 def transition_by_steps(by, x, u, w, theta, kinds, scales, density, own, F, G):
@@ -385,21 +389,30 @@ def of_own(motion, x, f, u, w, theta, h, own):
     return M
 
 
-def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G):
+def linear_part(motion, x, u, w, theta, h, own, kinds, scales, density, out):
+    """A part h of a step from x (n,), linear as it is midway, into out (n, n + w + o + 3): h times the derivatives of
+    the rates there by states, noises and a run's own parameters; the state there, its rates, and the state after."""
+    n, n_w, f = len(x), len(w), np.empty(len(x))
+    x1 = advance(motion, False, x, u, w, theta, h, 1)
+    middle = 0.5 * (x + x1)
+    motion(pointer(f), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
+    out[:, :n] = of_states(motion, middle, f, u, w, theta, h, kinds, scales)
+    out[:, n : n + n_w] = of_noises(motion, middle, f, u, w, theta, h, density)
+    out[:, n + n_w : -3] = of_own(motion, middle, f, u, w, theta, h, own)
+    out[:, -3], out[:, -2], out[:, -1] = middle, f, x1
+
+
+def transition_by_rates(by, x, u, w, theta, kinds, scales, density, own, F, G, along):
     """`transition` by the user's derivative: what Runge and Kutta's step makes of the system, linear as it is midway
     through a part, 1 + M + M^2 / 2 + M^3 / 6 + M^4 / 24, by forward differences there, part by part."""
-    motion, stepped, dt, parts = by
+    motion, _, dt, parts = by
     n, m, n_w, n_o, h = len(x), len(scales), len(w), own.shape[1], dt / parts
     of_all = n + n_w + n_o
-    E, one, f, x1 = np.eye(of_all), np.eye(of_all), np.empty(n), x
-    for _ in range(parts):
-        begun = x1
-        x1 = advance(motion, stepped, begun, u, w, theta, h, 1)
-        M, middle = np.zeros((of_all, of_all)), 0.5 * (begun + x1)
-        motion(pointer(f), pointer(middle), pointer(u), pointer(w), pointer(theta), h)
-        M[:n, :n] = of_states(motion, middle, f, u, w, theta, h, kinds, scales)
-        M[:n, n : n + n_w] = of_noises(motion, middle, f, u, w, theta, h, density)
-        M[:n, n + n_w :] = of_own(motion, middle, f, u, w, theta, h, own)
+    E, one, x1 = np.eye(of_all), np.eye(of_all), x
+    for part in range(parts):
+        linear_part(motion, x1, u, w, theta, h, own, kinds, scales, density, along[part])
+        M = np.zeros((of_all, of_all))
+        M[:n], x1 = along[part, :, :of_all], along[part, :, -1].copy()
         E = (one + M @ (one + M @ (one + M @ (one + M / 4.0) / 3.0) / 2.0)) @ E
     x1 = normalised(x1, kinds)
     later, d = E[:n, :n].copy(), np.zeros(m)

@@ -18,7 +18,10 @@ MOST_ROWS = 400_000  # of models flown at once: memory
 
 
 def errors_near(observer: Observer, n: int, points: Sequence[ModelPoint], by: Filtered, horizon: float) -> np.ndarray:
-    """Errors of models in tolerances, as `Observer.residuals` has them, of which the others are near the first."""
+    """Errors of models in tolerances, as `Observer.residuals` has them, of which the others are near the first.
+
+    by: the first one's filter, with its `linear`.
+    """
     if not observer.gives_rates:
         return observer.residuals(n, points, by, horizon)
     starts, _ = observer.windows(n, horizon)
@@ -32,7 +35,8 @@ def errors_near(observer: Observer, n: int, points: Sequence[ModelPoint], by: Fi
             observer.vehicle.kernels.follow_near(
                 driven.t[:until], driven.U[:, :until], driven.Y[:until], X0[of], driven.theta[of], points[0].own,
                 driven.reading[of], driven.push[:, :until], driven.which[of], points[0].ports, observer.kinds,
-                observer.scales, points[0].density, observer.angles, observer.parts, by.gains[:until], states,
+                observer.scales, points[0].density, observer.angles, observer.parts, by.gains[:until],
+                by.linear[:until], states,
             )  # fmt: skip
         return driven.errors(of, states[:, starts], horizon)
 

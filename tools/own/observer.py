@@ -33,6 +33,9 @@ MOST_KEPT = 10_000  # states that runs begin in
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
 
 
+NO_LINEAR = np.zeros((0, 0, 0, 0))
+
+
 @dataclass
 class Filtered:
     """What the filter of one model says of one run."""
@@ -43,6 +46,7 @@ class Filtered:
     gains: np.ndarray
     states: np.ndarray  # (rows, n + o) after each row
     covariances: np.ndarray  # (rows, errors, errors) of what the filter estimates, where they are asked for
+    linear: np.ndarray  # (rows, parts, n, n + noises + o + 3) `kernels.linear_part` of each, where it is asked for
 
 
 @dataclass
@@ -186,15 +190,17 @@ class Observer:
 
     # likelihood
 
-    def filter(self, n: int, point: ModelPoint, covariances: bool = False) -> Filtered:
-        """The filter of a model along run n; covariances: they are kept too."""
+    def filter(self, n: int, point: ModelPoint, covariances: bool = False, linear: bool = False) -> Filtered:
+        """The filter of a model along run n; covariances, linear: they are kept too."""
         run, declared, kernels = self.runs[n], self.declared, self.vehicle.kernels
         rows, n_y = run.outputs.shape
         m, n_o = len(self.scales) + 2 * len(point.ports), point.own.shape[1]
         x, P = self.start(n, point)
-        full = m + n_o
-        keep = (np.zeros((rows, full, n_y)), np.full((rows, len(declared.states) + n_o), np.nan),
-                np.zeros((rows if covariances else 0, full, full)))  # fmt: skip
+        full, n_x = m + n_o, len(declared.states)
+        kept = rows if linear and self.gives_rates else 0
+        keep = (np.zeros((rows, full, n_y)), np.full((rows, n_x + n_o), np.nan),
+                np.zeros((rows if covariances else 0, full, full)),
+                np.full((kept, self.parts, n_x, n_x + len(declared.noises) + n_o + 3), np.nan))  # fmt: skip
         try:
             driven = driven_inputs(run, declared, point)
             with np.errstate(all="ignore"):

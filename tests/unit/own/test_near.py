@@ -85,6 +85,8 @@ def test_models_near_one_are_what_each_is_by_itself(swinging):
               for k, size in enumerate(sizes)]  # fmt: skip
     each = swinging.residuals(0, [swinging.point, *points], by, HORIZON)
     near = errors_near(swinging, 0, [swinging.point, *points], by, HORIZON)
+    by = swinging.filter(0, swinging.point, linear=True)
+    assert errors_near(swinging, 0, [swinging.point, *points], by, HORIZON) == pytest.approx(near, abs=1e-7)
     assert near[0] == pytest.approx(each[0], abs=1e-9)
     for effect, one, other in zip(effects, each[1:] - each[0], near[1:] - near[0], strict=True):
         assert np.abs(one).max() > 1e-4, effect.label

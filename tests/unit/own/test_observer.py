@@ -343,6 +343,7 @@ def test_what_a_derivative_makes_of_errors_is_what_its_steps_make_of_them(tmp_pa
             own,
             F,
             G,
+            np.empty((parts, 6, 6 + 1 + 1 + 3)),
         )
         found.append((after, F, G))
     (by_rates, F, G), (by_steps, F_steps, G_steps) = found
