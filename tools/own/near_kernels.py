@@ -104,7 +104,7 @@ def advance_near(motion, X, u, w, theta, own, dt, parts, kinds, scales, density,
         else:
             linear_part(motion, X[0].copy(), u[0], w0, theta[0], h, own, kinds, scales, density, along)
         M, middle, f, x1 = along[:, :n].copy(), along[:, -3].copy(), along[:, -2].copy(), along[:, -1].copy()
-        pushed = beside @ along[:, n:-3].T
+        pushed = beside @ along[:, n:-3].copy().T
         for k in range(1, models):
             if driven[k]:
                 motion(pointer(g), pointer(middle), pointer(u[k]), pointer(w0), pointer(numbers[k]), h)
