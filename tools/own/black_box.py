@@ -1,8 +1,6 @@
 """The observer of a model that is only rolled out: no filter, windows begin at trends of the readings."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Self
 
 import numpy as np
 
@@ -27,11 +25,6 @@ class BlackBox(Observer):
 
     def _choose_starts(self) -> None:
         return
-
-    def of_runs(self, kept: Sequence[int]) -> Self:
-        other = super().of_runs(kept)
-        other._trends = {}
-        return other
 
     def readings(self, n: int, point: ModelPoint, row: int, until: float) -> dict[str, float]:
         """Value and rate of every output at a row of run n, by readings until a time, with the sensors' errors off."""

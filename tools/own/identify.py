@@ -185,9 +185,8 @@ def identify(
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
-    fit = replace(fit, scatter=scatter)
-    after = fit.held_out(found, eta)
-    labels, usual_of_labels = usual_labels(fit, others, eta)
+    after = fit.held_out(every, others)
+    labels, usual_of_labels = usual_labels(replace(fit, scatter=scatter), others, eta)
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon, errors)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)

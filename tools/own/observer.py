@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any
 
 import numba
 import numpy as np
@@ -90,14 +90,6 @@ class Observer:
         """The same observer with another model as its own."""
         other = copy.copy(self)
         other.point = point
-        return other
-
-    def of_runs(self, kept: Sequence[int]) -> Self:
-        """The same observer of some of its runs, with the windows that all have."""
-        _ = self.horizon  # of all runs: it is kept
-        other = copy.copy(self)
-        other.runs, other.starts = [self.runs[n] for n in kept], [self.starts[n] for n in kept]
-        other._begun, other._windows, other._first = {}, {}, {}
         return other
 
     # how a run begins

@@ -20,7 +20,6 @@ SHARES = 1.0, 0.4, 0.1  # of a step of runs' own values, until the exact posteri
 LEAST_DAMPING, MORE_DAMPING, MOST_DAMPING = 0.01, 4.0, 1e6  # of the curvature, number by number; times, a step
 MOST_MOVED = 2.0  # spreads of a number a round
 DAMPINGS = 8  # tried at most, from the least on that keeps steps short
-TRUSTED, OTHERS_ROUNDS = 2.0, 3  # times what a run's parabola says; rounds of a fit without that run
 UNSEEN = 1e-3  # curvature that is damped where runs say nothing
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
@@ -86,43 +85,14 @@ class RunsFit:
         level = RunLevel(self.errors, float(inflation(weighted)[-1]), scatter)
         return weighted, [level.of(one.tempered(level.eta)) for one in found], level
 
-    def led_on(self, rounds: int, eta: float) -> "RunsFit":
-        """The fit led on a few rounds, errors counted as they are, tempered by eta."""
-        fit, level = replace(self), RunLevel(self.errors, eta, 0.0)
-        for _ in range(rounds):
-            found = fit.expansions(keep_filter=True)
-            rests = fit.stepped([one.tempered(eta) for one in found], found, level, lambda text: None)
-            fit.errors = self.errors
-            if rests:
-                break
-        return fit
-
-    def held_out(self, found: Sequence[Expansion], eta: float) -> np.ndarray:
-        """Gaps (runs, outputs), in tolerances, of every run by a model of the others.
-
-        found: the runs where they are, errors of which one in eta is another. The model of the others is theirs to
-        first order; where the run left out is flown by it much worse than its own parabola says, they are fitted again.
-        """
-        observer, gaps = self.observer, list[np.ndarray]()
-        warm = [marginalised(one.tempered(eta), self.scatter) for one in found]
-        every = Pooled.of(warm, self.V).mean()
-        for n, others in enumerate(left_out(warm, self.V)):
-            values = np.clip(self.values + others.mean() - every, *self.limits)
+    def held_out(self, every: Pooled, others: Sequence[Pooled]) -> np.ndarray:
+        """Gaps (runs, outputs), in tolerances, of every run by a model of the others (`left_out`), to first order."""
+        observer, found = self.observer, list[np.ndarray]()
+        for n, one in enumerate(others):
+            values = np.clip(self.values + one.mean() - every.mean(), *self.limits)
             point = moved(observer.declared, observer.point, self.nuisance, values)
-            errors = observer.residuals(n, [point], observer.filter(n, point), observer.horizon)[0]
-            said = max(found[n].at_place(values), found[n].value)
-            if len(found) > 1 and self.errors.misfit(n, errors) > TRUSTED * said:
-                values = self._without_run(n).led_on(OTHERS_ROUNDS, eta).values
-                point = moved(observer.declared, observer.point, self.nuisance, values)
-            gaps.append(observer.gaps(n, point, observer.horizon))
-        return np.array(gaps)
-
-    def _without_run(self, n: int) -> "RunsFit":
-        """The fit of all runs but one."""
-        kept = [k for k in range(len(self.own)) if k != n]
-        whitenings = [self.errors.whitenings[k] for k in kept] if self.errors.whitenings else ()
-        return replace(self, observer=self.observer.of_runs(kept), own=self.own[kept],
-                       errors=replace(self.errors, whitenings=whitenings))  # fmt: skip
+            found.append(observer.gaps(n, point, observer.horizon))
+        return np.array(found)
 
     def stepped(
         self, warm: Sequence[Expansion], found: Sequence[Expansion], level: RunLevel, say: Callable[[str], None]

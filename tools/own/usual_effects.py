@@ -16,10 +16,10 @@ from glider.tools.inference.pooled import Pooled, log_prior, marginalised, witho
 from glider.tools.own.decision import SIZES, UsualLabels, log_odds
 from glider.tools.own.effects import PARAMETER, Effect, form_errors, standard_effects, unexplained
 from glider.tools.own.evidence import alone, size_evidence
-from glider.tools.own.hierarchy import LEAST_REACH, expand, inflation
+from glider.tools.own.hierarchy import LEAST_REACH, RunLevel, expand, inflation
 from glider.tools.own.measure import total_rms
 from glider.tools.own.posterior import MOST_EFFECTS
-from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, SCATTERS, USUAL_OWN_SCATTER, RunsFit
+from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, SCATTERS, USUAL_OWN_SCATTER, RunsFit, left_out
 
 USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads
 MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and how long, before one is chosen
@@ -59,12 +59,18 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
 def _left(fit: RunsFit) -> float:
     """Gap of runs left out, tolerances."""
     found = fit.expansions()
-    return total_rms(fit.held_out(found, float(inflation(found)[-1])))
+    eta = float(inflation(found)[-1])
+    warm = [marginalised(one.tempered(eta), fit.scatter) for one in found]
+    return total_rms(fit.held_out(Pooled.of(warm, fit.V), left_out(warm, fit.V)))
 
 
 def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float) -> tuple[float, RunsFit, Effect]:
     """The fit led on with one more label, its log evidence, errors counted as before, and the label."""
-    led = _beside(fit, effect, prior).led_on(TRIED_ROUNDS, eta)
+    led, level = _beside(fit, effect, prior), RunLevel(fit.errors, eta, 0.0)
+    for _ in range(TRIED_ROUNDS):
+        found = led.expansions()
+        led.stepped([one.tempered(eta) for one in found], found, level, lambda text: None)
+        led.errors = fit.errors
     warm = [marginalised(one.tempered(eta), led.scatter) for one in led.expansions()]
     return Pooled.of(warm, led.V).log_evidence() + log_odds(effect), led, effect
 

@@ -28,7 +28,7 @@ from glider.tools.own.evidence import alone
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
 from glider.tools.own.identify import run_inflation
 from glider.tools.own.posterior import Engine
-from glider.tools.own.runs_fit import LineSearch, RunsFit, left_out
+from glider.tools.own.runs_fit import LineSearch, left_out
 from glider.tools.own.watch import Event, Refit, Watch
 
 LABELS = [Effect("gain", INPUT, "motor", "gain", "1", 0.1), Effect("mass", PARAMETER, "mass", "value", "kg", 0.1),
@@ -263,33 +263,6 @@ def test_a_step_into_a_place_that_is_worse_by_its_own_filter_is_searched_by_that
     assert gain > 0.0
     assert 0.5 < values[0] <= 1.5
     assert own[:, 0] == pytest.approx(values[0])
-
-
-class Refitted(RunsFit):
-    """A fit of all runs but one, led to where its values are below 2."""
-
-    def _without_run(self, n):
-        return SimpleNamespace(led_on=lambda rounds, eta: SimpleNamespace(values=np.full(3, 1.5 + n)))
-
-
-def test_a_run_that_its_parabola_does_not_hold_for_is_flown_by_the_others_fitted_again(monkeypatch):
-    monkeypatch.setattr("glider.tools.own.runs_fit.moved", lambda declared, point, effects, values: values)
-    places = np.array([[4.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
-    runs = [about(places.mean(axis=0), place) for place in places]
-    tumbles = 0  # beyond its own place
-
-    def flown(n, points, by, horizon):
-        lost = 200.0 if n == tumbles and points[0][0] < 1.0 else 0.0
-        return np.array([[[np.sqrt(about(points[0], places[n]).value)], [lost]]])
-
-    observer = SimpleNamespace(declared=None, point=None, horizon=1.0, filter=lambda n, point: None, residuals=flown,
-                               gaps=lambda n, point, horizon: point)  # fmt: skip
-    limits, errors = (np.full(3, -20.0), np.full(3, 20.0)), ChannelErrors(np.ones(1), np.ones(1))
-    fit = Refitted(observer, LABELS, limits, np.zeros(3), 100.0 * np.eye(3), errors, places.mean(axis=0),
-                   np.tile(places.mean(axis=0), (3, 1)), np.zeros(3))  # fmt: skip
-    values = fit.held_out(runs, 1.0)
-    assert values[tumbles] == pytest.approx(1.5)
-    assert values[1:, 0] == pytest.approx([2.05, 2.0], abs=0.01)
 
 
 def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():
