@@ -1,11 +1,13 @@
 """The Fossen AUV of docs/examples: a thruster's gain, a current, a lever arm found, and none where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from glider.tools.own.decision import NONE
 from glider.tools.own.load import read_own
-from tests.support.own_cases import FOSSEN, answers, diagnosed, fly, size_of
+from tests.support.own_cases import FOSSEN, answers, diagnosed, fly, identified, size_of
 
 pytestmark = pytest.mark.computes(seconds=50)
 
@@ -13,6 +15,11 @@ pytestmark = pytest.mark.computes(seconds=50)
 @pytest.fixture(scope="module")
 def vehicle():
     return read_own(FOSSEN)
+
+
+@pytest.fixture(scope="module")
+def known(vehicle, tmp_path_factory):
+    return identified(vehicle, 5, tmp_path_factory.mktemp("known"))
 
 
 def first(answer) -> tuple[str, float]:
@@ -41,6 +48,32 @@ def test_a_change_is_found_with_its_size(vehicle, label, size, runs):
     mean, sd = size_of(answer, label)
     assert mean == pytest.approx(size, abs=3.0 * sd)
     assert sd < 0.3 * abs(size)
+
+
+@pytest.mark.parametrize("late", [0.4, -0.4])
+def test_all_inputs_late_are_one_cause_and_so_are_all_outputs(known, late):
+    """Commands that act later than they are stamped, and readings that are stamped later than they were taken."""
+    runs = fly(known, 14, {"inputs_delay": late})
+    clocks = [replace(run, outputs=shifted(known, run, late)) for run in fly(known, 15, {})]
+    for flown in (runs, clocks):
+        answer = diagnosed(known, flown)
+        found, chance = first(answer)
+        assert found == "inputs_delay"
+        assert chance > 0.9
+        assert size_of(answer, found)[0] == pytest.approx(late, abs=0.05)
+
+
+def test_one_input_late_is_not_all(known):
+    found, chance = first(diagnosed(known, fly(known, 16, {"elevator_delay": 0.6})))
+    assert found == "elevator_delay"
+    assert chance > 0.9
+
+
+def shifted(vehicle, run, late: float) -> np.ndarray:
+    """Outputs of a run read `late` seconds later than they are stamped."""
+    found = [np.interp(run.t - late, run.t, np.unwrap(y) if one.angle else y)
+             for one, y in zip(vehicle.declared.outputs, run.outputs.T, strict=True)]  # fmt: skip
+    return np.array(found).T
 
 
 def test_answers_of_sealed_cases_are_those_of_their_seed():

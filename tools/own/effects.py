@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.own.declare import DERIVED, RUN, Declaration, Input
+from glider.tools.own.declare import ALIKE, ALL_INPUTS, DERIVED, RUN, Declaration, Input
 from glider.tools.own.operating_points import point_weights
 from glider.tools.own.runs import OwnRun
 
@@ -101,7 +101,7 @@ def nominal_point(declared: Declaration) -> ModelPoint:
         if family == OUTPUT:
             reading[READ_ROWS.index(kind), declared.index("outputs", name)] += value
         else:
-            driven.setdefault(declared.index("inputs", name), {})[kind] = value
+            _drive(declared, driven, name, kind, value)
     return ModelPoint(
         np.array([one.value for one in declared.parameters]),
         reading,
@@ -121,21 +121,32 @@ def nominal_point(declared: Declaration) -> ModelPoint:
 
 
 def labels_of(declared: Declaration) -> dict[str, tuple[str, str, str]]:
-    """Family, name and kind of every label of inputs and outputs."""
+    """Family, name and kind of every label of inputs and outputs; of all inputs alike the name is ALL_INPUTS."""
     lists = (INPUT, declared.inputs, DERIVED["inputs"]), (OUTPUT, declared.outputs, DERIVED["outputs"])
-    return {f"{one.name}_{kind}": (family, one.name, kind)
-            for family, every, kinds in lists for one in every for kind in kinds}  # fmt: skip
+    alike = {f"{ALL_INPUTS}_{kind}": (INPUT, ALL_INPUTS, kind) for kind in ALIKE}
+    return alike | {f"{one.name}_{kind}": (family, one.name, kind)
+                    for family, every, kinds in lists for one in every for kind in kinds}  # fmt: skip
+
+
+def _drive(declared: Declaration, driven: dict[int, dict[str, float]], name: str, kind: str, size: float) -> None:
+    """More of what is wrong of an input, or of all, in place."""
+    every = range(len(declared.inputs)) if name == ALL_INPUTS else [declared.index("inputs", name)]
+    for place in every:
+        own = driven.setdefault(place, {})
+        own[kind] = own.get(kind, 0.0) + size
 
 
 def effects_of(declared: Declaration, point: ModelPoint) -> dict[str, float]:
-    """Labels of inputs and outputs that a model has, in their units: what `nominal_point` would make it of."""
+    """Labels of inputs and outputs that a model has, in their units: what `nominal_point` would make it of.
+
+    What all inputs have alike is each one's.
+    """
     none = nominal_point(replace(declared, effects={}))
-    read = {(OUTPUT, one.name, kind): point.reading[row, n] - none.reading[row, n]
+    read = {f"{one.name}_{kind}": point.reading[row, n] - none.reading[row, n]
             for n, one in enumerate(declared.outputs) for row, kind in enumerate(READ_ROWS)}  # fmt: skip
-    driven = {(INPUT, declared.inputs[n].name, kind): value
+    driven = {f"{declared.inputs[n].name}_{kind}": value
               for n, wrong in point.driven.items() for kind, value in wrong.items()}  # fmt: skip
-    sizes = read | driven
-    return {label: float(sizes[of]) for label, of in labels_of(declared).items() if sizes.get(of, 0.0) != 0.0}
+    return {label: float(size) for label, size in (read | driven).items() if size != 0.0}
 
 
 def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], values: np.ndarray) -> ModelPoint:
@@ -152,8 +163,7 @@ def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], v
         elif effect.family == OUTPUT:
             found.reading[READ_ROWS.index(effect.kind), declared.index("outputs", effect.name)] += size
         elif effect.family == INPUT:
-            own = found.driven.setdefault(declared.index("inputs", effect.name), {})
-            own[effect.kind] = own.get(effect.kind, 0.0) + size
+            _drive(declared, found.driven, effect.name, effect.kind, size)
         elif effect.family == PUSH:
             found.push[declared.index("noises", effect.name)] += size
         elif effect.family == GROWTH:
@@ -172,8 +182,9 @@ def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: 
     """
     found: list[Effect] = []
     every = np.concatenate([run.inputs for run in runs]) if declared.inputs else np.zeros((1, 0))
+    moving = [any(np.ptp(run.inputs[:, n]) > 0.0 for run in runs) for n in range(len(declared.inputs))]
     for n, one in enumerate(declared.inputs):
-        found += _of_input(one, every[:, n], any(np.ptp(run.inputs[:, n]) > 0.0 for run in runs))
+        found += _of_input(one, every[:, n], moving[n])
     duration = max(float(run.t[-1] - run.t[0]) for run in runs)
     for output, tolerance in zip(declared.outputs, tolerances, strict=True):
 
@@ -186,8 +197,13 @@ def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: 
             row("drift", f"{output.unit}/s", float(tolerance) / duration), row("lag", "s", SECONDS_SPREAD, 0.0),
             row("delay", "s", SECONDS_SPREAD, 0.0),
         ]  # fmt: skip
+    if sum(moving) > 1:  # outputs that all are late look as inputs do; a clock may be early, too
+        found += [Effect(f"{ALL_INPUTS}_{kind}", INPUT, ALL_INPUTS, kind, "s", SECONDS_SPREAD,
+                         -LONGEST if kind == "delay" else 0.0, LONGEST) for kind in ALIKE]  # fmt: skip
+    has = effects_of(declared, nominal_point(declared))
     for n, effect in enumerate(found):
-        begins = declared.effects.get(effect.label, 0.0) / effect.spread
+        of = [one.name for one in declared.inputs] if effect.name == ALL_INPUTS else [effect.name]
+        begins = min(has.get(f"{name}_{effect.kind}", 0.0) for name in of) / effect.spread
         found[n] = replace(effect, low=effect.low - begins, high=effect.high - begins)
     for parameter in declared.parameters:
         spread = parameter.uncertainty or UNKNOWN_SHARE * abs(parameter.value) or 1.0
@@ -305,7 +321,7 @@ def driven_inputs(run: OwnRun, declared: Declaration, point: ModelPoint) -> np.n
 def _driven(t: np.ndarray, u: np.ndarray, wrong: dict[str, float], interpolated: bool) -> np.ndarray:
     """One input (rows,): delayed, limited in rate, range and play, lagged; then gain and offset."""
     travel = float(np.ptp(u)) or float(np.abs(u).max()) or 1.0
-    if wrong.get("delay", 0.0) > 0.0:
+    if wrong.get("delay", 0.0) != 0.0:
         # held inputs: what was in force then; between rows shares of both, so that it is smooth in the delay
         u = np.interp(t - wrong["delay"], t, u)
     if wrong.get("rate_limit", 0.0) > 0.0:

@@ -1,5 +1,6 @@
 """What a user's model declares, and ten mistakes in one: each a line that names it."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,8 +12,8 @@ from glider.tools.data.errors import InputError
 from glider.tools.own.cases import own_vehicle
 from glider.tools.own.check import check_model, load_own
 from glider.tools.own.declare import DeclarationError, Output, column_of, declaration
-from glider.tools.own.effects import held_inputs
-from glider.tools.own.runs import load_own_run
+from glider.tools.own.effects import driven_inputs, effects_of, held_inputs, moved, nominal_point, standard_effects
+from glider.tools.own.runs import OwnRun, load_own_run
 
 MODEL = """
 import numpy as np
@@ -107,6 +108,31 @@ def test_a_parameter_may_not_be_called_as_a_cause_of_an_input_is():
                             rollout=lambda x0, t, u, theta: None)  # fmt: skip
     with pytest.raises(DeclarationError, match="parameters: fin_offset is what a cause of fin is called"):
         declaration(model)
+
+
+def test_what_all_inputs_have_alike_is_no_name_of_one():
+    rollout = {"outputs": {"roll": "rad"}, "rollout": lambda x0, t, u, theta: None}
+    with pytest.raises(DeclarationError, match="inputs: inputs means all inputs"):
+        declaration(SimpleNamespace(inputs={"inputs": "rad"}, parameters=[], **rollout))
+    with pytest.raises(DeclarationError, match="inputs_delay is what a cause of all inputs is called"):
+        declaration(SimpleNamespace(inputs={"fin": "rad"}, parameters=[("inputs_delay", "s", 0.0)], **rollout))
+
+
+def test_a_delay_of_all_inputs_is_each_one_s():
+    rollout = {"outputs": {"roll": "rad"}, "rollout": lambda x0, t, u, theta: None}
+    model = SimpleNamespace(inputs={"fin": "rad", "motor": "N"}, parameters=[], **rollout)
+    declared = replace(declaration(model), effects={"inputs_delay": 0.2, "fin_delay": 0.1})
+    has = effects_of(declared, nominal_point(declared))
+    assert has == pytest.approx({"fin_delay": 0.3, "motor_delay": 0.2})
+    t = np.arange(20.0)
+    runs = [OwnRun("run00", t, np.column_stack([np.sin(t), np.cos(t)]), np.zeros((20, 1)))]
+    every = {one.label: one for one in standard_effects(declared, runs, np.ones(1))}
+    assert every["fin_delay"].low * every["fin_delay"].spread == pytest.approx(-0.3)
+    both = moved(declared, nominal_point(declared), [every["inputs_delay"]], np.array([-1.0]))
+    assert effects_of(declared, both) == pytest.approx({"fin_delay": 0.1})
+    assert driven_inputs(runs[0], declared, both)[:, 1] == pytest.approx(runs[0].inputs[:, 1])
+    still = [replace(runs[0], inputs=runs[0].inputs * [1.0, 0.0])]
+    assert "inputs_delay" not in {one.label for one in standard_effects(declared, still, np.ones(1))}
 
 
 def test_missing_samples_of_an_interpolated_input_are_drawn_in_straight(vehicle, tmp_path):

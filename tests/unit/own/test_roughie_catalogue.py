@@ -28,4 +28,4 @@ def test_every_label_is_one_of_the_catalogue_s():
     unknown = set(model.catalogue_chances(causes)) - set(catalogue())
     assert unknown <= {f"mocap_{axis}_{kind}" for axis in "xyz" for kind in ("bias", "gain")} | {
         f"{name}_{kind}" for name in ("slider", "ballast") for kind in ("limit", "backlash")
-    }
+    } | {"inputs_lag", "inputs_delay"}
