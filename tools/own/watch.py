@@ -217,7 +217,9 @@ class Watch(WatchedRuns):
         """Scores (k,) of labels in an event's place by the parabola where it leads, and their sizes."""
         span, every, warm = (best.event.first, best.event.end), np.arange(self.k), Warm()
         (place,) = self.healthy.at([best.event.label])
-        runs = [self.again(n, best.sessions, every, place, best.event.size, warm) for n in range(*span)]
+        runs = self.observer.each(
+            lambda n: self.again(n, best.sessions, every, place, best.event.size, warm), range(*span)
+        )
         there = dict(zip(range(*span), self.together.marginal(runs), strict=True))
         gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(best.sessions, there)))
         predicted = best.score + gain - gain[place]

@@ -6,6 +6,7 @@ its events'. A label over a span, and another session, are led to where both are
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -54,7 +55,8 @@ class WatchedRuns(Engine):
         V = self.together.V / healthy.run_inflation
         shared, own = np.zeros(self.k), np.zeros((self.learned, self.k))
         for round_ in range(PREPARED):
-            found = [self.expansion_of(n, own[n], columns, keep_filter=True) for n in range(self.learned)]
+            about = partial(self._with_filter, own=own, columns=columns)
+            found = self.observer.each(about, range(self.learned))
             if self.learned > 2 and round_ < SCATTER_ROUNDS:
                 scatter = learn_scatter(found, self.together.V, healthy.scatter, learned_from=known_from)
                 self.together = replace(self.together, scatter=scatter)
@@ -64,7 +66,7 @@ class WatchedRuns(Engine):
             shared, own, gain = search.along(shared, own, pooled)
             if gain < CONVERGED_GAIN and round_ >= SCATTER_ROUNDS:
                 break
-        later = [self.about(n, shared, shared, columns).at for n in range(self.learned, self.count)]
+        later = self.observer.each(lambda n: self.about(n, shared, shared, columns).at, range(self.learned, self.count))
         self.found = self.expansions(np.array([*own, *later]), every)
         self.reach = np.sqrt(np.mean([one.reach for one in self.found], axis=0))
         self.runs = self.together.marginal(self.found)
@@ -72,6 +74,9 @@ class WatchedRuns(Engine):
         M = Pooled.of(known, self.together.V).covariance()
         self.events, self.sessions = list[Event](), [Session(self.learned, self.count, shared, M, shared)]
         self.another = of_another(known, healthy.V, healthy.session)
+
+    def _with_filter(self, n: int, own: np.ndarray, columns: np.ndarray) -> Expansion:
+        return self.expansion_of(n, own[n], columns, keep_filter=True)
 
     def about(
         self, n: int, around: np.ndarray, begin: np.ndarray, columns: np.ndarray, keep: bool = False
@@ -184,7 +189,9 @@ class WatchedRuns(Engine):
             if size == 0.0 and new is None:
                 runs = {}
             else:
-                again = [self.again(n, sessions, columns, label, size, warm, kept) for n in moved]
+                with_it = partial(self.again, sessions=sessions, columns=columns, label=label, size=size, warm=warm,
+                                  kept=kept)  # fmt: skip
+                again = self.observer.each(with_it, moved)
                 runs = dict(zip(moved, self.together.marginal(again), strict=True))
             pooled = self.pooled(sessions, runs)
             density = sum(one.log_density(*span, label, size) for one in pooled)
@@ -221,7 +228,11 @@ class WatchedRuns(Engine):
         self.sessions = list(sessions)
         if event is not None:
             self.events.append(event)
-        for n in moved:
+
+        def again(n: int) -> Expansion:
             around = self.at_run(n, self.sessions)
-            self.found[n] = self.about(n, around, self.found[n].at + around - before[n], np.arange(self.k))
-            (self.runs[n],) = self.together.marginal([self.found[n]])
+            return self.about(n, around, self.found[n].at + around - before[n], np.arange(self.k))
+
+        for n, found in zip(moved, self.observer.each(again, moved), strict=True):
+            self.found[n] = found
+            (self.runs[n],) = self.together.marginal([found])
