@@ -33,7 +33,7 @@ DERIVED = {
     "outputs": ("bias", "gain", "drift", "lag", "delay"),
     "noises": ("noise", "oscillation"),
 }
-ALL_INPUTS, ALIKE = "inputs", ("lag", "delay")  # what a chain of commands, or a clock, does to all inputs alike
+ALL_INPUTS, COMMON_KINDS = "inputs", ("lag", "delay")  # what a chain of commands, or a clock, does to all inputs
 # unit: tolerance of an output, standard deviation of a state at the start
 USUAL_TOLERANCE = {"m": 0.1, "rad": 0.0349, "rad/s": 0.0349, "m/s": 0.05, "m/s2": 0.1}
 USUAL_START = {"m": 0.1, "rad": 0.1, "rad/s": 0.1, "m/s": 0.2}
@@ -219,7 +219,7 @@ def declaration(model: Any) -> Declaration:
             taken[one.name] = what
     derived = {f"{one.name}_{kind}": one.name for what, kinds in DERIVED.items() for one in lists[what]
                for kind in kinds}  # fmt: skip
-    derived |= {f"{ALL_INPUTS}_{kind}": "all inputs" for kind in ALIKE}
+    derived |= {f"{ALL_INPUTS}_{kind}": "all inputs" for kind in COMMON_KINDS}
     for one in lists["parameters"]:
         if one.name in derived:
             what = f"{one.name} is what a cause of {derived[one.name]} is called; another name keeps them apart"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.own.declare import ALIKE, ALL_INPUTS, DERIVED, RUN, Declaration, Input
+from glider.tools.own.declare import ALL_INPUTS, COMMON_KINDS, DERIVED, RUN, Declaration, Input
 from glider.tools.own.operating_points import point_weights
 from glider.tools.own.runs import OwnRun
 
@@ -121,10 +121,10 @@ def nominal_point(declared: Declaration) -> ModelPoint:
 
 
 def labels_of(declared: Declaration) -> dict[str, tuple[str, str, str]]:
-    """Family, name and kind of every label of inputs and outputs; of all inputs alike the name is ALL_INPUTS."""
+    """Family, name and kind of every label of inputs and outputs; of all inputs the name is ALL_INPUTS."""
     lists = (INPUT, declared.inputs, DERIVED["inputs"]), (OUTPUT, declared.outputs, DERIVED["outputs"])
-    alike = {f"{ALL_INPUTS}_{kind}": (INPUT, ALL_INPUTS, kind) for kind in ALIKE}
-    return alike | {f"{one.name}_{kind}": (family, one.name, kind)
+    common = {f"{ALL_INPUTS}_{kind}": (INPUT, ALL_INPUTS, kind) for kind in COMMON_KINDS}
+    return common | {f"{one.name}_{kind}": (family, one.name, kind)
                     for family, every, kinds in lists for one in every for kind in kinds}  # fmt: skip
 
 
@@ -139,7 +139,7 @@ def _drive(declared: Declaration, driven: dict[int, dict[str, float]], name: str
 def effects_of(declared: Declaration, point: ModelPoint) -> dict[str, float]:
     """Labels of inputs and outputs that a model has, in their units: what `nominal_point` would make it of.
 
-    What all inputs have alike is each one's.
+    What all inputs have is each one's.
     """
     none = nominal_point(replace(declared, effects={}))
     read = {f"{one.name}_{kind}": point.reading[row, n] - none.reading[row, n]
@@ -199,7 +199,7 @@ def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: 
         ]  # fmt: skip
     if sum(moving) > 1:  # outputs that all are late look as inputs do; a clock may be early, too
         found += [Effect(f"{ALL_INPUTS}_{kind}", INPUT, ALL_INPUTS, kind, "s", SECONDS_SPREAD,
-                         -LONGEST if kind == "delay" else 0.0, LONGEST) for kind in ALIKE]  # fmt: skip
+                         -LONGEST if kind == "delay" else 0.0, LONGEST) for kind in COMMON_KINDS]  # fmt: skip
     has = effects_of(declared, nominal_point(declared))
     for n, effect in enumerate(found):
         of = [one.name for one in declared.inputs] if effect.name == ALL_INPUTS else [effect.name]
