@@ -70,11 +70,12 @@ class Vn100(Sensor):
         self.health.say(now, "port lost")
 
     def service(self, now: float) -> float:
-        """Set the sensor up, and again whenever it has nothing to say."""
-        if now - self._heard_at > ASK_AGAIN_S / 4 and now - self._asked_at >= ASK_AGAIN_S:
+        """Set the sensor up, and again whenever it has nothing to say; ask for its model until that is known."""
+        silent = now - self._heard_at > ASK_AGAIN_S / 4
+        if (silent or not self.model) and now - self._asked_at >= ASK_AGAIN_S:
             self._asked_at = now
-            self._send(vn100.encode_text("VNRRG,01") + self._setup)
-        return max(self._asked_at, self._heard_at) + ASK_AGAIN_S
+            self._send(vn100.encode_text("VNRRG,01") + (self._setup if silent else b""))
+        return (max(self._asked_at, self._heard_at) if self.model else self._asked_at) + ASK_AGAIN_S
 
     def feed(self, data: bytes, now: float) -> None:
         newest = None

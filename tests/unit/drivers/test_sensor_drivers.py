@@ -115,6 +115,25 @@ def test_a_silent_imu_is_set_up_again_and_again():
     assert b"$VNWRG,75,2,8,01,0129*75\r\n" in sent[0]
 
 
+def test_an_imu_that_streams_is_asked_for_its_model_until_it_says_it():
+    imu, sent = Vn100(ImuTable(device="vn100", port="p"), 115_200), []
+    imu.attach(lambda data: sent.append(data) or True)
+    imu.connected(0.0)
+
+    def second(begin: float) -> None:
+        for tenth in range(10):
+            feed_imu(imu, 0.0, 0.0, 0.0, now=begin + 0.1 * tenth)
+            assert imu.service(begin + 0.1 * tenth) > begin + 0.1 * tenth
+
+    second(0.0)  # it streams already
+    second(1.0)  # its answer was damaged on the line
+    assert sent == [vn100.encode_text("VNRRG,01")] * 2
+    imu.feed(vn100.encode_text("VNRRG,01,VN-100T-CR"), 2.0)
+    second(2.0)
+    assert imu.model == "VN-100T-CR"
+    assert len(sent) == 2
+
+
 def test_text_output_is_taken_too():
     imu = Vn100(ImuTable(device="vn100", port="p"), 115_200)
     text = "VNYMR,+090.000,+010.000,-005.000,+0.2,+0.0,+0.4,+0.0,+0.0,-9.8,+0.10,-0.20,+0.30"
