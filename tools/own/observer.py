@@ -3,6 +3,7 @@
 import contextlib
 import copy
 import itertools
+import math
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -29,7 +30,7 @@ NO_POINT = ModelPoint(
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
-MOST_KEPT = 10_000  # states that runs begin in
+MOST_KEPT, MOST_LINEAR = 10_000, 4_000_000  # states that runs begin in; numbers of a run's linear parts
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
 
 
@@ -191,16 +192,17 @@ class Observer:
     # likelihood
 
     def filter(self, n: int, point: ModelPoint, covariances: bool = False, linear: bool = False) -> Filtered:
-        """The filter of a model along run n; covariances, linear: they are kept too."""
+        """The filter of a model along run n; covariances, linear: kept too, the latter where there is room."""
         run, declared, kernels = self.runs[n], self.declared, self.vehicle.kernels
         rows, n_y = run.outputs.shape
         m, n_o = len(self.scales) + 2 * len(point.ports), point.own.shape[1]
         x, P = self.start(n, point)
         full, n_x = m + n_o, len(declared.states)
-        kept = rows if linear and self.gives_rates else 0
+        of_row = self.parts, n_x, n_x + len(declared.noises) + n_o + 3
+        kept = rows if linear and self.gives_rates and rows * math.prod(of_row) <= MOST_LINEAR else 0
         keep = (np.zeros((rows, full, n_y)), np.full((rows, n_x + n_o), np.nan),
                 np.zeros((rows if covariances else 0, full, full)),
-                np.full((kept, self.parts, n_x, n_x + len(declared.noises) + n_o + 3), np.nan))  # fmt: skip
+                np.full((kept, *of_row), np.nan))  # fmt: skip
         try:
             driven = driven_inputs(run, declared, point)
             with np.errstate(all="ignore"):

@@ -100,6 +100,9 @@ def test_few_at_once_are_the_same_as_many(swinging, monkeypatch):
     points = [moved(swinging.declared, swinging.point, effects, 0.1 * row) for row in np.eye(len(effects))]
     many = errors_near(swinging, 0, [swinging.point, *points], by, HORIZON)
     monkeypatch.setattr("glider.tools.own.near.MOST_ROWS", 5 * len(swinging.runs[0].t))
+    monkeypatch.setattr("glider.tools.own.observer.MOST_LINEAR", 100)
+    by = swinging.filter(0, swinging.point, linear=True)
+    assert by.linear.size == 0
     assert errors_near(swinging, 0, [swinging.point, *points], by, HORIZON) == pytest.approx(many, abs=1e-9)
 
 
