@@ -24,7 +24,7 @@ from glider.tools.own.steps import HORIZON, TIME_CONSTANTS, choose_parts, time_c
 
 FIRST_SECONDS, FIRST_READINGS = 1.0, 3  # over which the rate of an output at a run's start is taken, at least
 WARM_UP, WARM_UP_SHARE = 2.0, 0.1  # s of a window that find its start, at most; of the horizon
-NOTHING = np.zeros(0)
+NOTHING, NO_LINEAR = np.zeros(0), np.zeros((0, 0, 0, 0))
 NO_POINT = ModelPoint(
     NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
 )  # the vehicle file's own is taken
@@ -32,9 +32,6 @@ LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
 MOST_KEPT, MOST_LINEAR = 10_000, 4_000_000  # states that runs begin in; numbers of a run's linear parts
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
-
-
-NO_LINEAR = np.zeros((0, 0, 0, 0))
 
 
 @dataclass
@@ -199,10 +196,10 @@ class Observer:
         x, P = self.start(n, point)
         full, n_x = m + n_o, len(declared.states)
         of_row = self.parts, n_x, n_x + len(declared.noises) + n_o + 3
-        kept = rows if linear and self.gives_rates and rows * math.prod(of_row) <= MOST_LINEAR else 0
+        room = linear and self.gives_rates and rows * math.prod(of_row) <= MOST_LINEAR
         keep = (np.zeros((rows, full, n_y)), np.full((rows, n_x + n_o), np.nan),
                 np.zeros((rows if covariances else 0, full, full)),
-                np.full((kept, *of_row), np.nan))  # fmt: skip
+                np.full((rows if room else 0, *of_row), np.nan))  # fmt: skip
         try:
             driven = driven_inputs(run, declared, point)
             with np.errstate(all="ignore"):
@@ -217,7 +214,8 @@ class Observer:
             if not isinstance(raised.error, np.linalg.LinAlgError):
                 raise user_error(raised.error, self.vehicle.source, f"{run.name}") from None
             value, squares, samples = np.inf, np.inf, 1
-        return Filtered(float(value), float(squares), int(samples), *keep)
+        along = keep[3] if np.isfinite(value) else NO_LINEAR  # where the filter is lost models near one go on
+        return Filtered(float(value), float(squares), int(samples), *keep[:3], along)
 
     def follow(self, n: int, point: ModelPoint, by: Filtered, rows: int | None = None) -> np.ndarray:
         """States (rows, n + o) of a model along run n by kept gains; NaN where it is lost, and behind the first rows,

@@ -8,7 +8,7 @@ from glider.tools.own.check import load_own
 from glider.tools.own.compiled import plain
 from glider.tools.own.effects import moved, standard_effects, unexplained
 from glider.tools.own.near import errors_near, errors_pushed, errors_unsettled
-from glider.tools.own.observer import Observer
+from glider.tools.own.observer import LOST, Observer
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 
@@ -104,6 +104,19 @@ def test_few_at_once_are_the_same_as_many(swinging, monkeypatch):
     by = swinging.filter(0, swinging.point, linear=True)
     assert by.linear.size == 0
     assert errors_near(swinging, 0, [swinging.point, *points], by, HORIZON) == pytest.approx(many, abs=1e-9)
+
+
+def test_models_near_one_whose_filter_is_lost_go_on(swinging):
+    lost = swinging.point.copy()
+    lost.variance[:] = -1.0
+    by, whole = swinging.filter(0, lost, linear=True), swinging.filter(0, lost)
+    assert by.value == np.inf
+    other = swinging.point.copy()
+    other.theta *= 1.01
+    near = errors_near(swinging, 0, [lost, other], by, HORIZON)
+    assert near == pytest.approx(errors_near(swinging, 0, [lost, other], whole, HORIZON))
+    assert near[0] == pytest.approx(swinging.residuals(0, [lost], whole, HORIZON)[0], abs=1e-9)
+    assert np.abs(near).max() < LOST
 
 
 def test_forces_and_starts_move_windows_as_each_does_by_itself(swinging, monkeypatch):
