@@ -1,32 +1,14 @@
 """The gliding blimp's real flights, where they are at hand: identified on some, the others asked about."""
 
-import csv
-import gzip
 import json
-from pathlib import Path
 
 import pytest
 
 from tests.support.commands import glider
+from tests.support.real_vehicles import BLIMP as VEHICLE
+from tests.support.real_vehicles import copied, recorded
 
 pytestmark = pytest.mark.computes(seconds=430)
-
-VEHICLE = Path(__file__).parents[2] / "docs/examples/gliding_blimp/rgblimp.toml"
-
-
-def copied(folder: Path, runs: list[Path], column: str = "", change=lambda value: value) -> Path:
-    """A case of some runs with one column changed."""
-    folder.mkdir()
-    for n, path in enumerate(runs):
-        with gzip.open(path, "rt") as file:
-            head, *rows = list(csv.reader(file))
-        for row in rows:
-            if column:
-                k = head.index(column)
-                row[k] = f"{change(float(row[k])):.6f}"
-        (folder / f"run{n:02d}.csv").write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
-    (folder / "case.toml").write_text(f'format = 1\nvehicle = "blimp"\nruns = {len(runs)}\n')
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +18,7 @@ def flights(shared, tmp_path_factory):
     if not data.is_dir():
         pytest.skip("no data/rgblimp in the shared folder")
     folder = tmp_path_factory.mktemp("blimp")
-    cases = [sorted(case.glob("run[0-9]*.csv.gz")) for case in sorted(data.iterdir()) if case.is_dir()]
+    cases = [recorded(case) for case in sorted(data.iterdir()) if case.is_dir()]
     kept = [path for case in cases for path in case[1::2]]
     copied(folder / "healthy", [path for case in cases for path in case[::2]])
     done = glider("identify", "healthy", "--vehicle", VEHICLE, "--out", "identified", "--json", cwd=folder)

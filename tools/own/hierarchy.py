@@ -141,6 +141,15 @@ def room(reach: np.ndarray) -> np.ndarray:
     return np.maximum(LONGEST_MOVE, LONGEST_REACH / np.maximum(reach, LEAST_REACH))
 
 
+def shortened(steps: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Steps (..., k), each in its direction as far as no number moves further than `most` (k,).
+
+    Where numbers make up for each other, a step that is cut number by number leads uphill.
+    """
+    longest = np.max(np.abs(steps) / most, axis=-1, keepdims=True, initial=1.0)
+    return np.asarray(steps / longest)
+
+
 def multiples_of_pushes(
     declared: Declaration, effects: Sequence[Effect], driven: np.ndarray
 ) -> dict[int, tuple[int, float]]:

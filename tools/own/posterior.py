@@ -30,7 +30,7 @@ from glider.tools.own.decision import (
 from glider.tools.own.effects import FORM, NOISE, PUSH, UNEXPLAINED, moved
 from glider.tools.own.evidence import Place, alone, size_evidence, under_priors
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
-from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room
+from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room, shortened
 from glider.tools.own.observer import Observer
 from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 
@@ -129,12 +129,13 @@ class Engine:
         own = np.tile(shared, (self.count, 1)) if begin is None else begin.own.copy()
         rounds = ROUNDS if labels else FIRST_ROUNDS
         known = [one.only(columns) for one in begin.found] if begin is not None and begin.everywhere else []
-        most, by, last, odds = room(self.reach), self.together, None, log_prior(self.healthy, labels)
+        by, last, odds = self.together, None, log_prior(self.healthy, labels)
+        rooms, longest = room(self.reach), 1.0
         for round_ in range(rounds):
             here = Place(shared, own, known or self.expansions(own, columns, keep=round_ < rounds - 1))
             if last is not None and here.cost(by, places) > last.cost(by, places) + 2.0 * AT_REST:
-                way = np.abs(np.concatenate([[here.shared - last.shared], here.own - last.own])).max(axis=0)
-                here, most = last, SHORTER_WAY * np.minimum(most, way)
+                way = np.abs([here.shared - last.shared, *(here.own - last.own)]) / rooms
+                here, longest = last, SHORTER_WAY * min(longest, float(way.max()))
             last, shared, own, found = here, here.shared, here.own, here.found
             by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
             values = replace(pooled, V=by.V).mean()
@@ -148,7 +149,7 @@ class Engine:
             if round_ and evidence + odds + 0.5 * predicted_gain < self.ahead - BEHIND:
                 break
             if round_ < rounds - 1:
-                shared, own, gained, there = self._along(here, by, places, most)
+                shared, own, gained, there = self._along(here, by, places, longest * rooms)
                 known = there if abs(gained - predicted_gain) < AT_REST else []
             if gained == 0.0:
                 break
@@ -174,9 +175,9 @@ class Engine:
         cost, gained, share = here.cost(by, places), 0.0, 1.0
         for _ in range(WAY):
             target = np.clip(Pooled.of(by.marginal(found), by.V).mean(), self.low, self.high)
-            step = np.clip(target - shared, -most, most)
+            step = shortened(target - shared, most)
             of_runs = np.array([run_values(one, shared + step, by.scatter) for one in found])
-            of_runs = np.clip(np.clip(of_runs, self.low, self.high) - own, -most, most)
+            of_runs = shortened(np.clip(of_runs, self.low, self.high) - own, most)
             tried, theirs = shared + share * step, own + share * of_runs
             there = self._all_followed(theirs, columns, found)
             gain = cost - sum(one.value for one in there) - by.prior(tried, theirs, places)

@@ -7,7 +7,7 @@ import numpy as np
 
 from glider.tools.inference.pooled import Parabola, Pooled, learn_scatter, log_prior, marginalised, run_values
 from glider.tools.own.effects import Effect, moved
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, inflation
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, inflation, room, shortened
 from glider.tools.own.observer import Observer
 
 SHARED_ROUNDS, ROUNDS = 10, 40  # at most, until it is learned how runs differ, and from then on
@@ -16,7 +16,7 @@ SCATTER_ROUNDS = 4  # in which it is learned how runs differ, then held
 MIN_SCATTER_RUNS = 3  # from fewer nothing is learned of how runs differ
 USUAL_SCATTER, USUAL_OWN_SCATTER = 0.02, 0.5  # spreads, from run to run; of what is declared a number of each run
 SCATTERS = np.geomspace(0.005, 20.0, 60)  # candidates: spreads of form errors, tolerances of labels
-SHARES = 1.0, 0.4, 0.1  # of a step of runs' own values, until the exact posterior gains
+SHARES = 1.0, 0.4, 0.1  # of a step of a run's own values, until the exact posterior gains
 LEAST_DAMPING, MORE_DAMPING, MOST_DAMPING = 0.01, 4.0, 1e6  # of the curvature, number by number; times, a step
 MOST_MOVED = 2.0  # spreads of a number a round
 DAMPINGS = 8  # tried at most, from the least on that keeps steps short
@@ -181,8 +181,12 @@ class LineSearch:
     level: RunLevel | None = None  # of the runs' own errors, where they have one
 
     def prior(self, x: np.ndarray, own: np.ndarray) -> float:
-        apart, free = ((own - x) / np.maximum(self.scatter, 1e-6)) ** 2, np.diag(self.V) > 0.0
-        return float(apart.sum() + x[free] @ np.linalg.solve(self.V[np.ix_(free, free)], x[free]))
+        free = np.diag(self.V) > 0.0
+        return float(self.apart(x, own).sum() + x[free] @ np.linalg.solve(self.V[np.ix_(free, free)], x[free]))
+
+    def apart(self, x: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """-2 log prior density (runs,) of runs' own values (runs, k) about shared ones."""
+        return np.asarray((((own - x) / np.maximum(self.scatter, 1e-6)) ** 2).sum(axis=1))
 
     def misfit(self, n: int, row: np.ndarray) -> float:
         point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
@@ -212,26 +216,32 @@ class LineSearch:
         self, values: np.ndarray, own: np.ndarray, pooled: Pooled | None
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """`along`, by the filters that it has."""
+        rooms, shares = [room(np.sqrt(one.reach)) for one in self.warm], np.full((len(own), 1), SHARES[0])
 
-        def at(step: np.ndarray, of_own: float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
-            x = np.clip(values + step, *self.limits)
-            target = np.array([run_values(one, x, self.scatter) for one in self.warm])
-            theirs = own + of_own * np.clip(target - own, -MOST_MOVED, MOST_MOVED)
-            theirs = np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
-            return self.cost(x, theirs), x, theirs
+        def led(x: np.ndarray) -> np.ndarray:
+            steps = np.array([run_values(one, x, self.scatter) for one in self.warm]) - own
+            theirs = own + shares * np.array([shortened(*one) for one in zip(steps, rooms, strict=True)])
+            return np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
 
-        here = sum(one.value for one in self.warm) + self.prior(values, own), values, own
-        stay = here
-        for of_own in SHARES:
-            tried = at(np.zeros_like(values), of_own)
-            if tried[0] < stay[0]:
-                stay = tried
-                break
-        best = stay
+        costs, stay = np.array([one.value for one in self.warm]) + self.apart(values, own), own.copy()
+        before = float(costs.sum()) + self.prior(values, own[:0])
+        worse = np.arange(len(own))
+        for share in SHARES:
+            shares[worse] = share
+            tried = led(values)
+            found = self.observer.each(lambda n, tried=tried: self.misfit(n, tried[n]), worse)
+            found = np.array(found) + self.apart(values, tried[worse])
+            better = worse[found < costs[worse]]
+            costs[worse], stay[better] = np.minimum(found, costs[worse]), tried[better]
+            worse = np.setdiff1d(worse, better)
+        here = float(costs.sum()) + self.prior(values, own[:0]), values, stay
+        best = here
         for step in damped_steps(pooled, values) if pooled is not None else ():
-            tried = at(step)
-            if tried[0] < best[0]:
-                best = tried
-            elif best is not stay:
+            x = np.clip(values + step, *self.limits)
+            theirs = led(x)
+            cost = self.cost(x, theirs)
+            if cost < best[0]:
+                best = cost, x, theirs
+            elif best is not here:
                 break
-        return best[1], best[2], stay[0] - best[0]
+        return best[1], best[2], before - best[0]

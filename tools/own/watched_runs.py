@@ -12,7 +12,7 @@ import numpy as np
 
 from glider.tools.inference.pooled import Pooled, learn_scatter, run_values
 from glider.tools.own.decision import Healthy
-from glider.tools.own.hierarchy import LONGEST_MOVE, Expansion, room
+from glider.tools.own.hierarchy import Expansion, room, shortened
 from glider.tools.own.observer import Observer
 from glider.tools.own.posterior import AT_REST, Engine
 from glider.tools.own.runs_fit import CONVERGED_GAIN, MIN_SCATTER_RUNS, SCATTER_ROUNDS, LineSearch
@@ -105,8 +105,7 @@ class WatchedRuns(Engine):
                 share *= 0.5
             else:
                 best = cost, found
-                move = run_values(found, around, self.together.scatter) - own
-                step = np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
+                step = shortened(run_values(found, around, self.together.scatter) - own, room(np.sqrt(found.reach)))
                 if np.abs(step).max() < CONVERGED_OWN:
                     break
             own = np.clip(best[1].at + share * step, self.low, self.high)
@@ -172,13 +171,15 @@ class WatchedRuns(Engine):
     def led(
         self, span: tuple[int, int], sessions: Sequence[Session], label: int = 0, size: float = 0.0,
         target: Callable[[Sequence[SessionRuns], float], tuple[float, float]] = lambda pooled, size: (0.0, 1.0),
+        leading: int | None = None,
     ) -> Led:  # fmt: skip
         """A label over a span and the new one of sessions led to where both are most probable.
 
-        size: where the label begins; target: mean and 1 sigma of it by the parabola about a place. A step is halved
-        until the posterior does not fall: the parabola says where to go, the likelihood whether it is better there.
+        size: where the label begins; target: mean and 1 sigma of it by the parabola about a place; leading: the first
+        run of a session that is led in the place of the new one. A step is halved until the posterior does not fall:
+        the parabola says where to go, the likelihood whether it is better there.
         """
-        new, columns = self.begun(sessions), self.columns([label])
+        new, columns = self.begun(sessions) if leading is None else leading, self.columns([label])
         moved = sorted({*range(*span), *(n for n in range(self.learned, self.count)
                                          if self.session_of(n, sessions).first == new)})  # fmt: skip
         best, warm, kept, at_rest = None, Warm(), dict[int, Expansion](), False
@@ -218,6 +219,12 @@ class WatchedRuns(Engine):
     def left(self, n: int) -> float:
         """Mean square that a run leaves about where it was expanded, in units of what healthy runs leave."""
         return float(self.found[n].squares.sum() / max(1, self.found[n].samples.sum()))
+
+    def settle(self) -> None:
+        """Every session that is known led to where it is most probable, events being what they are: what further labels
+        and sessions are compared with."""
+        for first in [one.first for one in self.sessions if one.end > one.first]:
+            self.take(self.led((0, 0), self.sessions, leading=first).sessions)
 
     def take(self, sessions: Sequence[Session], event: Event | None = None) -> None:
         """Sessions and an event into what is known: runs that they move are expanded again where they are now."""
