@@ -80,7 +80,9 @@ def blimp(data: Path, out: Path) -> None:
     copied(out / "kept", kept)
     for name, model in (("published", BLIMP), ("kept", vehicle)):
         gap = asked(out, f"gap-{name}", "gap", "measure", "kept", "--vehicle", model)
-        print(f"{name}: {gap['total']:.2f}", {one: round(value, 1) for one, value in gap["channels"].items()}, flush=True)
+        print(
+            f"{name}: {gap['total']:.2f}", {one: round(value, 1) for one, value in gap["channels"].items()}, flush=True
+        )
     changes: dict[str, tuple[list[Path], str, Callable[[float], float]]] = {
         "same": (kept[::3], "", float),
         "same2": (kept[2::3], "", float),
@@ -90,7 +92,11 @@ def blimp(data: Path, out: Path) -> None:
     }
     for name, (runs, column, change) in changes.items():
         copied(out / name, runs, column, change)
-        print(f"{name}:", said(asked(out, f"said-{name}", "gap", "diagnose", name, "--vehicle", vehicle, "--out", f"{name}-answer")), flush=True)
+        print(
+            f"{name}:",
+            said(asked(out, f"said-{name}", "gap", "diagnose", name, "--vehicle", vehicle, "--out", f"{name}-answer")),
+            flush=True,
+        )
     spirals = [path for one in folders if "spiral" in one[0].parent.name for path in one[1::2]]
     copied(out / "spirals", spirals)
     copied(out / "spirals-moved", spirals, "mass_x_m", lambda value: value - 0.01, MOVED - 1)

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 
 from glider.tools.inference.healthy_level import HealthyLevel
 from glider.tools.inference.hyperparameters import HEALTHY
-from glider.tools.inference.pooled import marginalised
+from glider.tools.inference.pooled import Scatter, marginalised
 from glider.tools.own.effects import FORM, GROWTH, NOISE, OUTPUT, PARAMETER, PUSH, UNEXPLAINED, Effect
 from glider.tools.own.excess_noise import NOISE_SIZES
 from glider.tools.own.hierarchy import LEAST_REACH, ChannelErrors, Expansion
@@ -49,8 +49,8 @@ class Healthy:
 
     effects: list[Effect]  # every label, then pushes
     V: np.ndarray  # (k, k) covariance of the identified values
-    scatter: np.ndarray  # (k,) what runs differ by, integrated out
-    session: np.ndarray  # (k,) what sessions differ by beside it
+    scatter: Scatter  # what runs differ by, integrated out
+    session: Scatter  # what sessions differ by beside it
     usual: UsualLabels
     errors: ChannelErrors  # what healthy runs leave
     eta: float
@@ -63,10 +63,9 @@ class Healthy:
     def session_share(self) -> float:
         """Variance between sessions over that from run to run, of all that differs (geometric mean) but instruments:
         how their biases do, the vehicle file says."""
-        differs = (self.scatter > 0.0) & (self.session > 0.0) & [one.family != OUTPUT for one in self.effects]
-        return (
-            float(np.exp(2.0 * np.log(self.session[differs] / self.scatter[differs]).mean())) if differs.any() else 0.0
-        )
+        runs, sessions = self.scatter.sizes, self.session.sizes
+        differs = (runs > 0.0) & (sessions > 0.0) & [one.family != OUTPUT for one in self.effects]
+        return float(np.exp(2.0 * np.log(sessions[differs] / runs[differs]).mean())) if differs.any() else 0.0
 
     def at(self, labels: Sequence[str]) -> list[int]:
         known = [one.label for one in self.effects]
@@ -78,7 +77,7 @@ class Deviations:
     """What runs are off the identified vehicle by: what they have in common, and each its own."""
 
     V: np.ndarray  # (k, k)
-    scatter: np.ndarray  # (k,) 1 sigma
+    scatter: Scatter
 
     def marginal(self, found: Sequence[Expansion]) -> list[Expansion]:
         """Runs with their own deviations integrated out."""
@@ -89,9 +88,9 @@ class Deviations:
         free = np.diag(self.V) > 0.0
         free[list(places)] = False
         chosen = np.flatnonzero(free)
-        x, spread = shared[chosen], np.maximum(self.scatter, 1e-6)
+        x = shared[chosen]
         within = x @ np.linalg.solve(self.V[np.ix_(chosen, chosen)], x)
-        return float((((own - shared) / spread) ** 2).sum() + within)
+        return float(self.scatter.distance(own - shared).sum() + within)
 
 
 @dataclass

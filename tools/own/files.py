@@ -76,6 +76,8 @@ class IdentifiedTable(Table):
     run_inflation: Annotated[float, msgspec.Meta(ge=1.0)] = 1.0  # of what runs say of the values they share
     channel_inflation: dict[str, Annotated[float, msgspec.Meta(ge=1.0)]] = msgspec.field(default_factory=dict)
     scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # what runs differ by, 1 sigma in its unit
+    scatter_correlation: list[list[float]] = msgspec.field(default_factory=list)  # of the numbers of `scatter`
+    session_correlation: list[list[float]] = msgspec.field(default_factory=list)
     label_mean: dict[str, float] = msgspec.field(default_factory=dict)  # what all runs show of each label alone
     label_mean_error: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # 1 sigma of that
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
@@ -239,3 +241,7 @@ def _check_identified(table: IdentifiedTable, declared: Declaration, source: str
     count = len(table.parameters)
     if matrix.shape != (count, count) and count:
         raise ConfigError(source, f"expected {count} rows of {count}", key="identified.covariance")
+    count = len(table.scatter)
+    for key, rows in (("scatter", table.scatter_correlation), ("session", table.session_correlation)):
+        if rows and (len(rows) != count or any(len(row) != count for row in rows)):
+            raise ConfigError(source, f"expected {count} rows of {count}", key=f"identified.{key}_correlation")

@@ -5,9 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from glider.tools.inference.hyperparameters import HEALTHY
+from glider.tools.inference.pooled import Scatter
 from glider.tools.own.decision import Healthy, UsualLabels
 from glider.tools.own.declare import RUN
-from glider.tools.own.effects import NOISE, ModelPoint, form_errors, moved, noise_effects, standard_effects, unexplained
+from glider.tools.own.effects import (
+    NOISE,
+    Effect,
+    ModelPoint,
+    form_errors,
+    moved,
+    noise_effects,
+    standard_effects,
+    unexplained,
+)
 from glider.tools.own.error_components import Components, Whitening, patterns
 from glider.tools.own.files import IdentifiedTable
 from glider.tools.own.hierarchy import ChannelErrors
@@ -36,8 +46,9 @@ def healthy_of(observer: Observer) -> Healthy:
             ) ** 2
         errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
         scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
-        session = np.sqrt(USUAL_SESSION_SHARE) * scatter
-        return Healthy(effects, V, scatter, session, UsualLabels(*np.zeros((3, k))), errors, 1.0, 1, HEALTHY.run_scale)
+        of_sessions = Scatter(np.sqrt(USUAL_SESSION_SHARE) * scatter)
+        return Healthy(effects, V, Scatter(scatter), of_sessions, UsualLabels(*np.zeros((3, k))), errors, 1.0, 1,
+                       HEALTHY.run_scale)  # fmt: skip
     # an effect that the vehicle has of an input that never moves here is none of these runs
     known = [n for n, name in enumerate(table.parameters) if name in names]
     places = [names.index(table.parameters[n]) for n in known]
@@ -61,8 +72,23 @@ def healthy_of(observer: Observer) -> Healthy:
         np.array([table.channel_inflation.get(one.name, 1.0) for one in declared.outputs]),
         _whitenings(observer, table),
     )
-    return Healthy(effects, V, scatter, session, usual, errors, table.inflation, table.runs, table.level_scatter,
+    together = [_correlation(effects, table, one) for one in (table.scatter_correlation, table.session_correlation)]
+    runs, sessions = (Scatter(sizes, one) for sizes, one in zip((scatter, session), together, strict=True))
+    return Healthy(effects, V, runs, sessions, usual, errors, table.inflation, table.runs, table.level_scatter,
                    table.noise_gain, table.run_inflation)  # fmt: skip
+
+
+def _correlation(
+    effects: Sequence[Effect], table: IdentifiedTable, rows: Sequence[Sequence[float]]
+) -> np.ndarray | None:
+    """Of deviations (k, k), rows of the numbers of `scatter`; None of a file that does not say."""
+    if not rows:
+        return None
+    names, found = [one.label for one in effects], np.eye(len(effects))
+    known = [n for n, name in enumerate(table.scatter) if name in names]
+    places = [names.index(name) for name in table.scatter if name in names]
+    found[np.ix_(places, places)] = np.array(rows)[np.ix_(known, known)]
+    return found
 
 
 def _whitenings(observer: Observer, table: IdentifiedTable) -> list[Whitening]:

@@ -37,6 +37,7 @@ class Expansion(Parabola):
     blocks: np.ndarray  # (PARTS, y + 1, k) sums over parts of windows of (J e)^2, by channel, and of all together
     diagonal: np.ndarray  # (y + 1, k) what they would be, were errors independent; both empty where not asked for
     reach: np.ndarray  # (k,) mean square that a spread moves the channels, tolerances
+    by_channel: np.ndarray  # (y, k, k) curvature by channel, untempered; empty where scores are not asked for
     derivatives: np.ndarray | None = None  # (k, rows, y) of the independent errors, where they are kept
     filtered: Filtered | None = None  # the run's filter there, where it is kept
 
@@ -111,19 +112,21 @@ def expand(
     weight = 1.0 / healthy.inflation
     flat = J.reshape(len(effects), e.size)
     weighted = (J * weight).reshape(flat.shape)
-    blocks, diagonal = _scores(J, e, weight, observer.windows(n, horizon)) if scores else (NO_SCORES, NO_SCORES)
+    blocks, diagonal, by_channel = (
+        _scores(J, e, weight, observer.windows(n, horizon)) if scores else (NO_SCORES, NO_SCORES, NO_SCORES)
+    )
     return Expansion(
         at.copy(), float((weight * e * e).sum()), weighted @ e.ravel(), weighted @ flat.T, (e**2).sum(axis=0),
-        np.where(seen, shape[0], 0), gap_squares, blocks, diagonal, reach,
+        np.where(seen, shape[0], 0), gap_squares, blocks, diagonal, reach, by_channel,
         J if keep else None, replace(by, linear=NO_LINEAR) if keep or keep_filter else None,
     )  # fmt: skip
 
 
 def _scores(
     J: np.ndarray, e: np.ndarray, weight: np.ndarray, windows: tuple[np.ndarray, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """`blocks` and `diagonal` of an expansion with derivatives J (k, rows, y) of errors e (rows, y) that count by
-    weight (y,)."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`blocks`, `diagonal` and `by_channel` of an expansion with derivatives J (k, rows, y) of errors e (rows, y) that
+    count by weight (y,)."""
     starts, ends = windows
     rows, weighted = ends - starts - 1, weight * e
     first, score, blocks = np.cumsum(rows) - rows, J * weighted, list[np.ndarray]()
@@ -132,7 +135,9 @@ def _scores(
         sums = np.add.reduceat(score, cuts, axis=1)  # (k, blocks, y)
         blocks.append(np.concatenate([(sums**2).sum(axis=1).T, (sums.sum(axis=2) ** 2).sum(axis=1)[None]]))
     by_channel = np.einsum("kry,kry->yk", score, score)
-    return np.array(blocks), np.concatenate([by_channel, np.einsum("kry,kry,ry->k", score, J, e)[None]])
+    diagonal = np.concatenate([by_channel, np.einsum("kry,kry,ry->k", score, J, e)[None]])
+    each = np.moveaxis(J, 2, 0)  # (y, k, rows)
+    return np.array(blocks), diagonal, weight[:, None, None] * (each @ each.transpose(0, 2, 1))
 
 
 def room(reach: np.ndarray) -> np.ndarray:

@@ -55,8 +55,8 @@ def tables(found: Identified) -> dict[str, Any]:
     given = tomllib.loads(vehicle.text)
     values, errors = found.handed_out
     sd = np.sqrt(np.diag(errors))
-    scatter = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.scatter, strict=True)}
-    session = {one.label: float(s * one.spread) for one, s in zip(found.nuisance, found.session_scatter, strict=True)}
+    scatter, session = ({one.label: float(s * one.spread) for one, s in zip(found.nuisance, by.sizes, strict=True)}
+                        for by in (found.scatter, found.session_scatter))  # fmt: skip
     usual = {name: {one.label: float(s * one.spread) for one, s in zip(found.labels, row, strict=True)}
              for name, row in (("label_mean", found.usual.mean), ("label_mean_error", found.usual.error),
                                ("label_scatter", found.usual.scatter))}  # fmt: skip
@@ -101,7 +101,7 @@ def tables(found: Identified) -> dict[str, Any]:
         "run_inflation": found.run_inflation,
         "level_scatter": found.level_scatter,
         "scatter": {name: value for name, value in scatter.items() if value > 0.0},
-        "session_scatter": {name: value for name, value in session.items() if value > 0.0}, **usual,
+        "session_scatter": {name: value for name, value in session.items() if value > 0.0}, **_together(found), **usual,
         "noise_gain": found.noise_gain, "form": form,
         "input_shares": dict(declared.input_shares),
         "operating_points": [list(one) for one in declared.operating_points],
@@ -143,6 +143,13 @@ def plain(found: Identified) -> dict[str, Any]:
         "channel_ratio": found.channel_ratio, "handed_out": "identified" if found.better else "file",
         "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes, *shown],
     }  # fmt: skip
+
+
+def _together(found: Identified) -> dict[str, Any]:
+    """Correlations of what runs and sessions differ by, where there are any."""
+    free, every = found.scatter.free, (("scatter", found.scatter), ("session", found.session_scatter))
+    return {f"{name}_correlation": one.correlation[np.ix_(free, free)].tolist()
+            for name, one in every if one.correlation is not None}  # fmt: skip
 
 
 def _components(found: Identified) -> dict[str, Any]:

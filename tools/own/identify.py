@@ -8,7 +8,9 @@ import numpy as np
 from glider.tools.inference.pooled import (
     Parabola,
     Pooled,
+    Scatter,
     learn_scatter,
+    learn_scatter_together,
     marginalised,
 )
 from glider.tools.own.decision import UsualLabels
@@ -42,6 +44,7 @@ from glider.tools.own.runs_fit import (
     USUAL_OWN_SCATTER,
     USUAL_SCATTER,
     RunsFit,
+    by_channel,
     left_by,
     left_out,
     level_scatter,
@@ -61,7 +64,7 @@ class Identified:
     nuisance: list[Effect]
     values: np.ndarray  # (nuisance,) spreads
     covariance: np.ndarray
-    scatter: np.ndarray  # (nuisance,) spreads, from run to run
+    scatter: Scatter  # (nuisance,) spreads, from run to run
     labels: list[Effect]
     usual: UsualLabels
     eta: float
@@ -73,7 +76,7 @@ class Identified:
     after: np.ndarray  # the same of a model of the other runs
     level_scatter: float
     sessions: int
-    session_scatter: np.ndarray  # (nuisance,) spreads, from session to session beside that
+    session_scatter: Scatter  # from session to session beside that
     operating_scatter: dict[str, float]  # by noise, spreads: 1 sigma of what goes with operating points
     noise_gain: dict[str, float]  # nat a window that excess noise gains in healthy runs, by label
     effects: list[str] = field(default_factory=list)  # labels among the nuisance that all runs show
@@ -145,13 +148,13 @@ def identify(
     limits = np.array([one.low for one in nuisance]), np.array([one.high for one in nuisance])
     usual = usual_scatter(vehicle.declared, nuisance)
     # forces of runs wait until what runs share is found: else they take it for their own
-    scatter = np.where([one.family == PUSH for one in nuisance], np.minimum(usual, USUAL_SCATTER), usual)
+    first = np.where([one.family == PUSH for one in nuisance], np.minimum(usual, USUAL_SCATTER), usual)
     file_point = observer.point.copy()
     before = np.array([observer.gaps(n, file_point, horizon) for n in range(count)])
     say(f"{count} runs, {k} numbers; the file's model misses them by {total_rms(before):.2f} tolerances")
     scales = np.maximum(channel_rms(before), LEAST_SCALE)
     errors = ChannelErrors(np.where(np.isfinite(scales), scales, 1.0), np.ones(len(scales)))
-    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), scatter)
+    fit = RunsFit(observer, nuisance, limits, usual, V, errors, np.zeros(k), np.zeros((count, k)), Scatter(first))
     fit = fit.led_at_levels(say)
     fit_levels(observer, [moved(declared, observer.point, nuisance, row) for row in fit.own],
                fit.errors.scales, say)  # fmt: skip
@@ -164,7 +167,7 @@ def identify(
     errors, found = fit.errors, fit.expansions(keep=True)
     *_, eta = inflation(found)
     if count < MIN_SCATTER_RUNS:
-        scatter = fit.usual
+        scatter = Scatter(fit.usual)
     else:
         scores = [channel_scores(observer, n, nuisance, one, errors).tempered(eta) for n, one in enumerate(found)]
         times = persistence(scores, V, scatter, vehicles)
@@ -179,7 +182,7 @@ def identify(
     scatter, session_scatter = learn_sessions(tempered, V, scatter, counts, biases)
     warm = [marginalised(one, scatter) for one in tempered]
     each = in_sessions(tempered, scatter, counts) if len(counts) > 1 else warm
-    apart = session_scatter if len(counts) > 1 else np.zeros_like(scatter)
+    apart = session_scatter if len(counts) > 1 else Scatter(np.zeros(len(nuisance)))
     every, others = Pooled.of(warm, V), left_out(warm, V)
     between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
@@ -237,21 +240,26 @@ def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> 
 
 
 def learn_sessions(
-    found: Sequence[Expansion], V: np.ndarray, scatter: np.ndarray, counts: Sequence[int], allowed: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """1 sigma (nuisance,) from run to run within sessions, and of sessions beside that.
+    found: Sequence[Expansion], V: np.ndarray, scatter: Scatter, counts: Sequence[int], allowed: np.ndarray
+) -> tuple[Scatter, Scatter]:
+    """What runs differ by within sessions, and sessions beside that.
 
     scatter: over all runs; allowed (nuisance,): by which the vehicle file allows sessions to differ, spreads (a bias is
     another in each case). One session says nothing of how sessions differ: what is usual is assumed.
     """
     if len(counts) < 2:
-        return scatter, np.hypot(np.sqrt(USUAL_SESSION_SHARE) * scatter, allowed)
-    within = learn_scatter(found, V + np.diag(scatter**2), scatter, counts)
-    usual = np.hypot(np.sqrt(USUAL_SESSION_SHARE) * within, allowed)
-    return within, learn_scatter(in_sessions(found, within, counts), V, usual)
+        return scatter, Scatter.of(USUAL_SESSION_SHARE * scatter.covariance + np.diag(allowed**2))
+    A = by_channel(found)
+    within, effects = learn_scatter_together(found, V + scatter.covariance, scatter.sizes, A, counts)
+    usual = np.hypot(np.sqrt(USUAL_SESSION_SHARE) * within.sizes, allowed)
+    each = in_sessions(found, within, counts)
+    if within.correlation is None:
+        return within, learn_scatter(each, V, Scatter(usual))
+    least = USUAL_SESSION_SHARE * np.where(np.isfinite(effects), effects, 0.0)
+    return within, learn_scatter_together(each, V, usual, A, least=least)[0]
 
 
-def in_sessions(found: Sequence[Expansion], scatter: np.ndarray, counts: Sequence[int]) -> list[Parabola]:
+def in_sessions(found: Sequence[Expansion], scatter: Scatter, counts: Sequence[int]) -> list[Parabola]:
     """The runs of each session as one, their own deviations integrated out."""
     runs, ends = [marginalised(one, scatter) for one in found], np.cumsum(counts)
     return [Pooled.of(runs[end - count : end], np.zeros(0)).parabola()

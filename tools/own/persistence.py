@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glider.tools.inference.pooled import Parabola, Pooled, marginalised, run_values
+from glider.tools.inference.pooled import Parabola, Pooled, Scatter, marginalised, run_values
 from glider.tools.own.effects import Effect, moved
 from glider.tools.own.hierarchy import ChannelErrors, Expansion
 from glider.tools.own.observer import Observer
@@ -49,11 +49,11 @@ def channel_scores(
     return ChannelScores(one.at, slope, J @ J.transpose(0, 2, 1) / errors.inflation[:, None, None])
 
 
-def persistence(runs: Sequence[ChannelScores], V: np.ndarray, scatter: np.ndarray, of: np.ndarray) -> np.ndarray:
+def persistence(runs: Sequence[ChannelScores], V: np.ndarray, scatter: Scatter, of: np.ndarray) -> np.ndarray:
     """Variance inflation (y,) of what runs say channel by channel, at least 1: variance of their scores over what
     independent errors would have, median over some values.
 
-    Scores are taken at each run's most probable deviations, of 1 sigma `scatter` (k,), from what all runs share (prior
+    Scores are taken at each run's most probable deviations from what all runs share (prior
     V: k, k). With H_y the curvature of a channel and M the covariance of the deviations, independent errors' would have
     the variance H_y - H_y M H_y; of (k,), bool: the values that count.
     """
@@ -64,8 +64,8 @@ def persistence(runs: Sequence[ChannelScores], V: np.ndarray, scatter: np.ndarra
         seen, expected = np.zeros((len(found), len(V))), np.zeros((len(found), len(V)))
         for one, all_channels in zip(runs, whole, strict=True):
             own = run_values(all_channels, shared, scatter)
-            inner = np.eye(len(V)) + scatter[:, None] ** 2 * all_channels.curvature
-            M = np.linalg.solve(inner, np.diag(scatter**2))  # covariance of its deviation
+            inner = np.eye(len(V)) + scatter.covariance @ all_channels.curvature
+            M = np.linalg.solve(inner, scatter.covariance)  # of its deviation
             seen += (one.slope + one.curvature @ (own - one.at)) ** 2 / found[:, None]
             H = one.curvature
             expected += np.diagonal(H, axis1=1, axis2=2) - np.einsum("yki,ij,yjk->yk", H, M, H) / found[:, None]

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from glider.tools.inference.pooled import Pooled, run_values
+from glider.tools.inference.pooled import Pooled, Scatter, run_values
 from glider.tools.own.decision import (
     FORM_SHARES,
     SIZES,
@@ -51,10 +51,10 @@ class Engine:
         self.horizon = observer.horizon
         self.low = np.array([one.low for one in healthy.effects])
         self.high = np.array([one.high for one in healthy.effects])
-        self.active = (np.diag(healthy.V) > 0.0) | (healthy.scatter > 0.0)
+        self.active = (np.diag(healthy.V) > 0.0) | (healthy.scatter.sizes > 0.0)
         # runs of one session, or each of another: which, their evidence says
-        self.together = Deviations(healthy.V + np.diag(healthy.session**2), healthy.scatter)
-        self.apart = Deviations(healthy.V, np.hypot(healthy.scatter, healthy.session))
+        self.together = Deviations(healthy.V + healthy.session.covariance, healthy.scatter)
+        self.apart = Deviations(healthy.V, Scatter.of(healthy.scatter.covariance + healthy.session.covariance))
         # constant numbers that a hypothesis may add; noises are weighed beside them (excess_noise.py)
         self.candidate = np.array([one.family not in (FORM, NOISE) for one in healthy.effects])
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)

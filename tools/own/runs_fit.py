@@ -5,7 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glider.tools.inference.pooled import Parabola, Pooled, learn_scatter, log_prior, marginalised, run_values
+from glider.tools.inference.pooled import (
+    Parabola,
+    Pooled,
+    Scatter,
+    learn_scatter_together,
+    log_prior,
+    marginalised,
+    run_values,
+)
 from glider.tools.own.effects import Effect, moved
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, expand, inflation, room, shortened
 from glider.tools.own.observer import Observer
@@ -38,7 +46,7 @@ class RunsFit:
     errors: ChannelErrors
     values: np.ndarray  # (k,) spreads
     own: np.ndarray  # (runs, k)
-    scatter: np.ndarray  # (k,)
+    scatter: Scatter
 
     def expansions(self, keep: bool = False, keep_filter: bool = False) -> list[Expansion]:
         """Every run about its own values; keep, keep_filter: as in `expand`."""
@@ -69,8 +77,8 @@ class RunsFit:
             warm = [one.tempered(level.eta) for one in found]
             if learned < SCATTER_ROUNDS:
                 fit.V = with_form_errors([marginalised(one, fit.scatter) for one in warm], fit.V, fit.nuisance)
-                scatter = learn_scatter(warm, fit.V, fit.usual)
-                fit.scatter = scatter if learned == 0 else np.sqrt(fit.scatter * scatter)
+                scatter, _ = learn_scatter_together(warm, fit.V, fit.usual, by_channel(found))
+                fit.scatter = scatter if learned == 0 else fit.scatter.half_way(scatter)
                 learned += 1
             if fit.stepped(warm, found, level, say) and learned == SCATTER_ROUNDS:
                 break
@@ -150,6 +158,11 @@ def with_form_errors(found: Sequence[Expansion], V: np.ndarray, nuisance: Sequen
     return V
 
 
+def by_channel(found: Sequence[Expansion]) -> np.ndarray:
+    """Curvature (y, k, k) of a run by channel, the mean."""
+    return np.asarray(np.mean([one.by_channel for one in found], axis=0))
+
+
 def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:
     """What the other runs say, of each run; a single one's others are itself."""
     return [Pooled.of([*found[:n], *found[n + 1 :]] or found, V) for n in range(len(found))]
@@ -171,7 +184,7 @@ class LineSearch:
     observer: Observer
     nuisance: list[Effect]
     warm: Sequence[Expansion]
-    scatter: np.ndarray
+    scatter: Scatter
     eta: float
     V: np.ndarray
     limits: tuple[np.ndarray, np.ndarray]
@@ -186,7 +199,7 @@ class LineSearch:
 
     def apart(self, x: np.ndarray, own: np.ndarray) -> np.ndarray:
         """-2 log prior density (runs,) of runs' own values (runs, k) about shared ones."""
-        return np.asarray((((own - x) / np.maximum(self.scatter, 1e-6)) ** 2).sum(axis=1))
+        return self.scatter.distance(own - x)
 
     def misfit(self, n: int, row: np.ndarray) -> float:
         point = moved(self.observer.declared, self.observer.point, self.nuisance, row)
@@ -221,7 +234,7 @@ class LineSearch:
         def led(x: np.ndarray) -> np.ndarray:
             steps = np.array([run_values(one, x, self.scatter) for one in self.warm]) - own
             theirs = own + shares * np.array([shortened(*one) for one in zip(steps, rooms, strict=True)])
-            return np.clip(np.where(self.scatter > 0.0, theirs, x), *self.limits)
+            return np.clip(np.where(self.scatter.sizes > 0.0, theirs, x), *self.limits)
 
         costs, stay = np.array([one.value for one in self.warm]) + self.apart(values, own), own.copy()
         before = float(costs.sum()) + self.prior(values, own[:0])
@@ -229,8 +242,8 @@ class LineSearch:
         for share in SHARES:
             shares[worse] = share
             tried = led(values)
-            found = self.observer.each(lambda n, tried=tried: self.misfit(n, tried[n]), worse)
-            found = np.array(found) + self.apart(values, tried[worse])
+            misfits = self.observer.each(lambda one: self.misfit(*one), [(n, tried[n]) for n in worse])
+            found = np.array(misfits) + self.apart(values, tried[worse])
             better = worse[found < costs[worse]]
             costs[worse], stay[better] = np.minimum(found, costs[worse]), tried[better]
             worse = np.setdiff1d(worse, better)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glider.tools.inference.pooled import Parabola, Pooled, marginalised
+from glider.tools.inference.pooled import Parabola, Pooled, Scatter, marginalised
 from glider.tools.own.hierarchy import Expansion
 
 
@@ -40,12 +40,12 @@ def split(sessions: Sequence[Session], first: int, mean: np.ndarray, V: np.ndarr
     return found
 
 
-def of_another(runs: Sequence[Parabola], V: np.ndarray, session: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def of_another(runs: Sequence[Parabola], V: np.ndarray, session: Scatter) -> tuple[np.ndarray, np.ndarray]:
     """Mean and covariance of another session's values: V of the identified vehicle, runs of the reference (tempered,
-    their own deviations integrated out), session (k,) 1 sigma of what sessions differ by."""
+    their own deviations integrated out), session: what sessions differ by."""
     apart = marginalised(Pooled.of(runs, V).parabola(), session)
     known = Pooled.of([apart], V)
-    return known.mean(), known.covariance() + np.diag(session**2)
+    return known.mean(), known.covariance() + session.covariance
 
 
 @dataclass

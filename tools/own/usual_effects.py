@@ -83,7 +83,7 @@ def _beside(fit: RunsFit, effect: Effect, prior: float) -> RunsFit:
     return replace(
         fit, nuisance=[*fit.nuisance, effect], limits=(np.append(low, effect.low), np.append(high, effect.high)),
         usual=np.append(fit.usual, 0.0), V=V, values=np.append(fit.values, 0.0),
-        own=np.column_stack([fit.own, np.zeros(runs)]), scatter=np.append(fit.scatter, 0.0),
+        own=np.column_stack([fit.own, np.zeros(runs)]), scatter=fit.scatter.beside(np.zeros(1)),
     )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def _without(fit: RunsFit, effect: Effect) -> RunsFit:
     return replace(
         fit, nuisance=[one for one in fit.nuisance if one is not effect], limits=(low[kept], high[kept]),
         usual=fit.usual[kept], V=fit.V[np.ix_(kept, kept)], values=fit.values[kept], own=fit.own[:, kept],
-        scatter=fit.scatter[kept],
+        scatter=fit.scatter.only(kept),
     )  # fmt: skip
 
 
@@ -113,7 +113,7 @@ def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float
     found = [expand(observer, n, effects, np.append(row, beside), fit.errors, observer.horizon)
              for n, row in enumerate(fit.own)]  # fmt: skip
     reach = np.sqrt(np.mean([one.reach for one in found], axis=0))
-    scatter, eta = np.append(fit.scatter, beside), float(inflation(found)[-1])
+    scatter, eta = fit.scatter.beside(beside), float(inflation(found)[-1])
     warm = [marginalised(one.tempered(eta), scatter) for one in found]
 
     def log_odds_of(places: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def usual_labels(fit: RunsFit, others: Sequence[Pooled], eta: float) -> tuple[li
         variances, axes = np.linalg.eigh(without_it.covariance())
         known, root = into @ without_it.mean(), into @ (axes * np.sqrt(np.maximum(variances, 0.0)))
         one = expand(observer, n, every, into @ fit.own[n], fit.errors, observer.horizon).tempered(eta)
-        one = marginalised(replace(one, at=one.at - known), into @ fit.scatter)
+        one = without(replace(one, at=one.at - known), into @ fit.scatter.root)
         about.append(without(one, root))
     slopes = np.array([-one.offset for one in about])[:, : len(labels)]
     precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]

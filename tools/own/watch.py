@@ -45,7 +45,8 @@ WITH_SESSION = 0.5  # of changes: that they begin with a session, where one begi
 MOST_EVENTS = 4
 REFITTED, SPANS = 5, 4  # labels by the parabola about no label, over the best spans
 UNLIKELY = 7.0  # nat behind the best by the parabola there: not refitted
-SHOWN = 3  # numbers that a session differs by
+SHOWN = 3  # numbers that a session differs by, labels that it may be instead
+LEAST_SHOWN, MENTIONED = 0.005, 0.05  # probability of a label, and of all together in words
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ class Watch(WatchedRuns):
             any_change = logsumexp(np.concatenate([scores.ravel() for *_, scores in tables])) + self.change_odds > 0.0
             places = [Place(tables[t][1][row], self.expanded(tables[t][0]), tables[t][2][row])
                       for _, t, row in (ranked[:SPANS] if any_change else ())]  # fmt: skip
-            found = self.compared(places)
+            found = self.compared(places, other)
             total = float(logsumexp([one.score for one in found])) + self.change_odds if found else -np.inf
             if total > other:
                 taken, chances = self.decided(found)
@@ -159,17 +160,22 @@ class Watch(WatchedRuns):
                     continue
             if other <= 0.0:
                 break
-            self.say(f"another session from {self.name(self.begun(with_other) or 0)} on: {other:.1f} nat")
+            first = self.begun(with_other) or 0
+            self.say(f"another session from {self.name(first)} on: {other:.1f} nat")
+            there = [replace(one, score=one.score + self.change_odds - np.logaddexp.reduce([0.0, other, total]))
+                     for one in found if one.event.first == first]  # fmt: skip
+            self.instead[first] = chances_of(there)
             self.take(with_other)
 
     def name(self, n: int) -> str:
         return self.observer.runs[n].name
 
-    def compared(self, places: Sequence[Place]) -> list[Refit]:
+    def compared(self, places: Sequence[Place], other: float) -> list[Refit]:
         """Labels over spans, refitted where each leads.
 
-        First those that are best by the parabola about no label. Then, where an event can be probable, every label that
-        is likely in the best one's place, over each of the spans, until the best one stays.
+        First those that are best by the parabola about no label. Then, where an event can be more probable than none
+        and than a session alone (log odds `other`), every label that is likely in the best one's place, over each of
+        the spans, until the best one stays.
         """
         found, best = dict[tuple[str, int, int], Refit](), None
 
@@ -186,7 +192,7 @@ class Watch(WatchedRuns):
                 starts |= dict(strong_sizes(self.observer, self.healthy, self.reach, runs)[:REFITTED])
             add(one, starts)
         while found and (leading := max(found.values(), key=lambda one: one.score)) is not best:
-            if leading.score + np.log(self.named) + self.change_odds < 0.0:
+            if leading.score + np.log(self.named) + self.change_odds < max(0.0, other):
                 break
             best, span = leading, (leading.event.first, leading.event.end)
             predicted, size = self.swapped(best)
@@ -205,9 +211,7 @@ class Watch(WatchedRuns):
         """The event that is most probable of labels over spans, one of which it is, and the chance of each label: a
         label where labels together are more probable than a force that none has; the span that is best for it."""
         effects, total = {one.label: one for one in self.healthy.effects}, logsumexp([one.score for one in found])
-        chances: dict[str, float] = {}
-        for one in found:
-            chances[one.event.label] = chances.get(one.event.label, 0.0) + float(np.exp(one.score - total))
+        chances = chances_of([replace(one, score=one.score - total) for one in found])
         forces = {label for label in chances if effects[label].family in UNEXPLAINED}
         named = sum(chance for label, chance in chances.items() if label not in forces)
         among = [label for label in chances if (label in forces) == (named < 0.5)]
@@ -216,10 +220,10 @@ class Watch(WatchedRuns):
 
     def swapped(self, best: Refit) -> tuple[np.ndarray, np.ndarray]:
         """Scores (k,) of labels in an event's place by the parabola where it leads, and their sizes."""
-        span, every, warm = (best.event.first, best.event.end), np.arange(self.k), Warm()
+        span, warm = (best.event.first, best.event.end), Warm()
         (place,) = self.healthy.at([best.event.label])
         runs = self.observer.each(
-            lambda n: self.again(n, best.sessions, every, place, best.event.size, warm), range(*span)
+            lambda n: self.again(n, best.sessions, span, place, best.event.size, warm, every=True), range(*span)
         )
         there = dict(zip(range(*span), self.together.marginal(runs), strict=True))
         gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(best.sessions, there)))
@@ -278,15 +282,25 @@ class Watch(WatchedRuns):
         first, found = self.sessions[0], []
         for one in self.pooled(self.sessions[1:]):
             value, sd = one.session.mean + one.mean - first.values, np.sqrt(np.maximum(np.diag(one.M + first.V), 0.0))
-            clear = np.abs(value) / np.hypot(sd, np.maximum(self.together.scatter, 1e-9))
+            clear = np.abs(value) / np.hypot(sd, np.maximum(self.together.scatter.sizes, 1e-9))
             rows = []
-            for k in np.argsort(-np.where(self.healthy.session > 0.0, clear, 0.0))[:SHOWN]:
+            for k in np.argsort(-np.where(self.healthy.session.sizes > 0.0, clear, 0.0))[:SHOWN]:
                 effect = self.healthy.effects[k]
                 low, high = ((value[k] + side * NINETY * sd[k]) * effect.spread for side in (-1.0, 1.0))
                 rows.append({"name": effect.label, "difference": float(value[k] * effect.spread),
                              "ci90": [float(low), float(high)], "unit": effect.unit})  # fmt: skip
-            found.append({"from_run": self.name(one.session.first), "differences": rows})
+            likely = sorted(self.instead.get(one.session.first, {}).items(), key=lambda item: -item[1])
+            found.append({"from_run": self.name(one.session.first), "differences": rows,
+                          "labels": {label: p for label, p in likely if p > LEAST_SHOWN}})  # fmt: skip
         return found
+
+
+def chances_of(found: Sequence[Refit]) -> dict[str, float]:
+    """Probability of each label, that of refits being the exponential of their scores."""
+    chances: dict[str, float] = {}
+    for one in found:
+        chances[one.event.label] = chances.get(one.event.label, 0.0) + float(np.exp(one.score))
+    return chances
 
 
 def log_evidence(pooled: Sequence[SessionRuns]) -> float:
@@ -344,12 +358,17 @@ def watch(
     names = [run.name for run in observer.runs[drop:]]
     learned_from = [run.name for run in observer.runs[:learned]]
     sessions = engine.differences()
-    cautions += [f"another session begins with {one['from_run']}: {_said(one)}, as sessions differ" for one in sessions]
+    cautions += [f"another session begins with {one['from_run']}: {_said(one)}" for one in sessions]
     return Watched(
         names, learned - drop, events, healthy, gaps[drop:], strange[drop:], cautions, learned_from, sessions
     )
 
 
 def _said(session: dict[str, Any]) -> str:
-    """What a session differs by, in words."""
-    return ", ".join(f"{one['name']} {one['difference']:+.2g} {one['unit']}" for one in session["differences"])
+    """What a session differs by, in words, and the change that it may be instead."""
+    differs = ", ".join(f"{one['name']} {one['difference']:+.2g} {one['unit']}" for one in session["differences"])
+    change = sum(session["labels"].values())
+    if change < MENTIONED:
+        return f"{differs}, as sessions differ"
+    labels = ", ".join(f"{label} {p:.2f}" for label, p in list(session["labels"].items())[:SHOWN])
+    return f"{differs}, as sessions differ; or something changed too, with probability {change:.2f}: {labels}"

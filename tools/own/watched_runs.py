@@ -20,7 +20,7 @@ from glider.tools.own.sessions import Session, SessionRuns, of_another
 from glider.tools.own.watched import Event
 
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
-LED_ROUNDS, PREPARED = 8, 20
+LED_ROUNDS, SETTLED, PREPARED = 8, 4, 20
 
 Warm = dict[int, tuple[np.ndarray, np.ndarray]]  # run: most probable values (k,) last, and those about which
 
@@ -74,6 +74,7 @@ class WatchedRuns(Engine):
         M = Pooled.of(known, self.together.V).covariance()
         self.events, self.sessions = list[Event](), [Session(self.learned, self.count, shared, M, shared)]
         self.another = of_another(known, healthy.V, healthy.session)
+        self.instead = dict[int, dict[str, float]]()  # by first run of a session: probabilities of labels in its place
 
     def _with_filter(self, n: int, own: np.ndarray, columns: np.ndarray) -> Expansion:
         return self.expansion_of(n, own[n], columns, keep_filter=True)
@@ -84,7 +85,7 @@ class WatchedRuns(Engine):
         """Run n expanded in some columns about its most probable values by the exact likelihood, led from `begin` (k,);
         around: those that it is thought to have; keep: with its derivatives."""
         healthy, scatter, own = self.healthy, self.together.scatter, np.clip(begin, self.low, self.high)
-        free = np.flatnonzero(scatter)
+        free = scatter.free
         for _ in range(OWN_ROUNDS):
             found = self.expansion_of(n, own, free, keep_filter=True)
             search = LineSearch(self.observer, healthy.effects, [found], scatter, healthy.eta, self.together.V,
@@ -100,7 +101,7 @@ class WatchedRuns(Engine):
         own, best, share = np.clip(begin, self.low, self.high), None, 1.0
         for _ in range(OWN_ROUNDS):
             found = self.followed(n, own, columns, one)
-            cost = found.value + float((((own - around) / np.maximum(self.together.scatter, 1e-6)) ** 2).sum())
+            cost = found.value + float(self.together.scatter.distance(own - around))
             if best is not None and cost > best[0]:
                 share *= 0.5
             else:
@@ -128,15 +129,17 @@ class WatchedRuns(Engine):
         return self.session_of(n, sessions).values + self.of_events(n)
 
     def again(
-        self, n: int, sessions: Sequence[Session], columns: np.ndarray, label: int, size: float, warm: Warm,
-        kept: dict[int, Expansion] | None = None,
+        self, n: int, sessions: Sequence[Session], span: tuple[int, int], label: int, size: float, warm: Warm,
+        kept: dict[int, Expansion] | None = None, every: bool = False,
     ) -> Expansion:  # fmt: skip
-        """Run n expanded again where it is, or was last, with a label of a size (spreads) beside its events.
+        """Run n expanded again where it is, or was last, with a label of a size (spreads) over a span, and its events.
 
-        kept: runs' last expansions with derivatives, which serve for another place.
+        kept: runs' last expansions with derivatives, which serve for another place; every: in all columns.
         """
-        around = self.at_run(n, sessions)
-        around[label] = np.clip(around[label] + size, self.low[label], self.high[label])
+        around, columns = self.at_run(n, sessions), np.arange(self.k) if every else self.columns()
+        if span[0] <= n < span[1]:
+            around[label] = np.clip(around[label] + size, self.low[label], self.high[label])
+            columns = columns if every else self.columns([label])
         at, before = warm.get(n) or (self.found[n].at, self.at_run(n, self.sessions))
         begin = at + around - before
         if kept is not None and n in kept:
@@ -173,15 +176,16 @@ class WatchedRuns(Engine):
         target: Callable[[Sequence[SessionRuns], float], tuple[float, float]] = lambda pooled, size: (0.0, 1.0),
         leading: int | None = None,
     ) -> Led:  # fmt: skip
-        """A label over a span and the new one of sessions led to where both are most probable.
+        """A label over a span, and what runs of its sessions share, led to where both are most probable; the new one of
+        sessions too, or that which begins with run `leading`.
 
-        size: where the label begins; target: mean and 1 sigma of it by the parabola about a place; leading: the first
-        run of a session that is led in the place of the new one. A step is halved until the posterior does not fall:
-        the parabola says where to go, the likelihood whether it is better there.
+        size: where the label begins; target: mean and 1 sigma of it by the parabola about a place. A step is halved
+        until the posterior does not fall: the parabola says where to go, the likelihood whether it is better there.
         """
-        new, columns = self.begun(sessions) if leading is None else leading, self.columns([label])
-        moved = sorted({*range(*span), *(n for n in range(self.learned, self.count)
-                                         if self.session_of(n, sessions).first == new)})  # fmt: skip
+        new = self.begun(sessions) if leading is None else leading
+        moving = {one.first for one in sessions if one.first == new or max(one.first, span[0]) < min(one.end, span[1])}
+        moved = [n for n in range(self.learned, self.count)
+                 if span[0] <= n < span[1] or self.session_of(n, sessions).first == new]  # fmt: skip
         best, warm, kept, at_rest = None, Warm(), dict[int, Expansion](), False
         for round_ in range(LED_ROUNDS):
             if at_rest or round_ == LED_ROUNDS - 1:  # derivatives serve on the way, evidence is taken where they are
@@ -190,8 +194,9 @@ class WatchedRuns(Engine):
             if size == 0.0 and new is None:
                 runs = {}
             else:
-                with_it = partial(self.again, sessions=sessions, columns=columns, label=label, size=size, warm=warm,
-                                  kept=kept)  # fmt: skip
+                with_it = partial(
+                    self.again, sessions=sessions, span=span, label=label, size=size, warm=warm, kept=kept
+                )
                 again = self.observer.each(with_it, moved)
                 runs = dict(zip(moved, self.together.marginal(again), strict=True))
             pooled = self.pooled(sessions, runs)
@@ -199,7 +204,7 @@ class WatchedRuns(Engine):
             gain = np.inf if best is None else density - best.log_density
             if best is not None and gain < -AT_REST:
                 size = 0.5 * (size + best.size)
-                sessions = [replace(one, values=0.5 * (one.values + other.values)) if one.first == new else one
+                sessions = [replace(one, values=0.5 * (one.values + other.values)) if one.first in moving else one
                             for one, other in zip(sessions, best.sessions, strict=True)]  # fmt: skip
                 continue
             best = Led(sessions, pooled, size, density)
@@ -211,7 +216,7 @@ class WatchedRuns(Engine):
                 break
             if not at_rest and round_ < LED_ROUNDS - 1:
                 size += step
-                sessions = [replace(one, values=each.given(*span, label, size)) if one.first == new else one
+                sessions = [replace(one, values=each.given(*span, label, size)) if one.first in moving else one
                             for one, each in zip(sessions, pooled, strict=True)]  # fmt: skip
         assert best is not None
         return best
@@ -224,7 +229,13 @@ class WatchedRuns(Engine):
         """Every session that is known led to where it is most probable, events being what they are: what further labels
         and sessions are compared with."""
         for first in [one.first for one in self.sessions if one.end > one.first]:
-            self.take(self.led((0, 0), self.sessions, leading=first).sessions)
+            before = -np.inf
+            for _ in range(SETTLED):
+                found = self.led((0, 0), self.sessions, leading=first)
+                self.take(found.sessions)
+                if found.log_density < before + CONVERGED_GAIN:
+                    break
+                before = found.log_density
 
     def take(self, sessions: Sequence[Session], event: Event | None = None) -> None:
         """Sessions and an event into what is known: runs that they move are expanded again where they are now."""

@@ -7,7 +7,7 @@ import numpy as np
 from glider.tools.inference.expansion import Expansion, expand
 from glider.tools.inference.fit import bounded_step
 from glider.tools.inference.hyperparameters import WATCH
-from glider.tools.inference.pooled import marginalised
+from glider.tools.inference.pooled import Scatter, marginalised
 from glider.tools.inference.problem import Problem
 from glider.tools.inference.shared_model import fit_shared, inflation_of
 from glider.tools.inference.shared_parameters import SharedParameters
@@ -59,7 +59,7 @@ class RunEnsemble:
     def made(self, n: int, one: Expansion) -> Expansion:
         """A parabola of a run as events are judged by it."""
         sizes = np.hypot(self.sizes, self.form[n]) if n in self.form else self.sizes
-        return marginalised(one.tempered(self.inflation_in_run(n)), sizes)
+        return marginalised(one.tempered(self.inflation_in_run(n)), Scatter(sizes))
 
     def expanded(self, n: int, x: np.ndarray) -> Expansion:
         """A run's parabola about other values."""
@@ -87,7 +87,7 @@ class RunEnsemble:
     def let_go(self, n: int) -> None:
         """A run that flies by a model that nobody knows says nothing of what the others share."""
         wide = np.maximum(self.sizes, self.shared.prior)
-        self.runs[n] = marginalised(self.raw[n].tempered(self.inflation), wide)
+        self.runs[n] = marginalised(self.raw[n].tempered(self.inflation), Scatter(wide))
 
     def deviation(self, n: int) -> np.ndarray:
         """A run's own most probable deviation from the model that it flies by, (count,) spreads, within limits.

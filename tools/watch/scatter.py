@@ -31,9 +31,11 @@ def learn_scatter(found: Sequence[Expansion], shared: SharedParameters) -> np.nd
 
     def cost(shift: np.ndarray) -> float:
         sizes = (USUAL * np.exp(shift))[groups]
-        return -pooled.log_evidence(found, V, sizes) + 0.5 * float(shift @ shift) / WATCH.scatter_width**2
+        return (
+            -pooled.log_evidence(found, V, pooled.Scatter(sizes)) + 0.5 * float(shift @ shift) / WATCH.scatter_width**2
+        )
 
     start = np.vstack([np.zeros(len(USUAL)), np.eye(len(USUAL))])  # e-folds
     options = {"initial_simplex": start, "maxfev": 60, "xatol": 0.1, "fatol": 0.1}
     best = minimize(cost, start[0], method="Nelder-Mead", options=options)
-    return pooled.learn_scatter(found, V, (USUAL * np.exp(best.x))[groups])
+    return pooled.learn_scatter(found, V, pooled.Scatter((USUAL * np.exp(best.x))[groups])).sizes

@@ -49,7 +49,7 @@ def test_it_is_learned_where_it_is_and_nothing_where_not(found):
     assert found.vehicle.declared.form["surge", "flap"] == pytest.approx(found.form, abs=0.03)
     assert abs(found.vehicle.declared.form["surge", "thrust"]) < 0.1
     at = [one.label for one in found.answer.nuisance].index("surge_push")
-    assert found.answer.scatter[at] * 0.02 < 0.02  # what runs differ by is not asked to stand for it
+    assert found.answer.scatter.sizes[at] * 0.02 < 0.02  # what runs differ by is not asked to stand for it
 
 
 def test_how_much_less_runs_say_than_their_likelihood_stands_in_the_file(found):

@@ -6,10 +6,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.special import logsumexp
 
 from glider.tools.inference.hyperparameters import HEALTHY
-from glider.tools.inference.pooled import Pooled, learn_scatter
+from glider.tools.inference.pooled import (
+    Parabola,
+    Pooled,
+    Scatter,
+    learn_scatter,
+    learn_scatter_together,
+    log_evidence,
+    run_values,
+)
 from glider.tools.own.decision import (
     FORM_SHARES,
     SIZES,
@@ -25,7 +35,7 @@ from glider.tools.own.decision import (
 from glider.tools.own.diagnose import worse
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.evidence import alone
-from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
+from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel, shortened
 from glider.tools.own.identify import run_inflation
 from glider.tools.own.posterior import Engine
 from glider.tools.own.runs_fit import LineSearch, left_out
@@ -41,7 +51,7 @@ def run_at(place: np.ndarray, alike: float = 0.0) -> Expansion:
     curvature = PRECISION * np.array([[1.0, alike, 0.0], [alike, 1.0, 0.0], [0.0, 0.0, 1.0]])
     blocks, ones = np.zeros((2, 2, 3)), np.ones(3)
     return Expansion(np.zeros(3), float(place @ curvature @ place), -curvature @ place, curvature, np.ones(1),
-                     np.ones(1), np.ones(1), blocks, blocks[0], ones)  # fmt: skip
+                     np.ones(1), np.ones(1), blocks, blocks[0], ones, curvature[None])  # fmt: skip
 
 
 class Columns:
@@ -59,9 +69,13 @@ def usually(scatter: float = 0.0, mean: float = 0.0) -> UsualLabels:
     return UsualLabels(scatter * first, mean * first, np.zeros(3))
 
 
+def by_itself(size: float) -> Scatter:
+    return Scatter(np.array([0.0, 0.0, size]))
+
+
 def healthy(**changes) -> Healthy:
     errors = ChannelErrors(np.ones(1), np.ones(1))
-    one = Healthy(LABELS, np.zeros((3, 3)), np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.7]),
+    one = Healthy(LABELS, np.zeros((3, 3)), by_itself(1.0), by_itself(0.7),
                   usually(), errors, 1.0, 10, 0.5)  # fmt: skip
     return replace(one, **changes)
 
@@ -75,7 +89,7 @@ def engine(runs: int, **changes) -> Engine:
 def test_scatter_is_learned_where_runs_may_differ_and_stays_nothing_elsewhere():
     random = np.random.default_rng(3)
     runs = [run_at(np.array([0.0, 0.0, 0.7]) * random.standard_normal(3)) for _ in range(60)]
-    found = learn_scatter(runs, np.zeros((3, 3)), np.array([0.0, 0.02, 0.5]))
+    found = learn_scatter(runs, np.zeros((3, 3)), Scatter(np.array([0.0, 0.02, 0.5]))).sizes
     assert found[0] == 0.0
     assert found[1] < 0.03
     assert found[2] == pytest.approx(0.7, rel=0.2)
@@ -84,15 +98,75 @@ def test_scatter_is_learned_where_runs_may_differ_and_stays_nothing_elsewhere():
 def test_a_few_runs_change_little_of_a_scatter_that_many_have_shown():
     """Three runs, one of them far off: what 30 healthy runs differ by stays nearly as it is."""
     runs, usual = [run_at(np.array([0.0, 0.0, place])) for place in (0.1, -0.2, 3.0)], np.array([0.0, 0.0, 0.4])
-    known, unknown = (learn_scatter(runs, np.zeros((3, 3)), usual, learned_from=count)[2] for count in (30, 0))
+    known, unknown = (
+        learn_scatter(runs, np.zeros((3, 3)), Scatter(usual), learned_from=count).sizes[2] for count in (30, 0)
+    )
     assert known < 0.75 < 1.3 < unknown
+
+
+@pytest.mark.parametrize("little", [0.15, 0.3])
+def test_numbers_that_make_up_for_each_other_scatter_far_and_do_little_together(little):
+    """Of three numbers of a run the sum of the first two is what its rows show best; it differs by `little`."""
+    random, A = np.random.default_rng(4), np.diag([20.0, 20.0, 20.0]) + 2000.0 * np.outer([1, 1, 0], [1, 1, 0])
+    runs = []
+    for _ in range(40):
+        apart, both, third = random.standard_normal(3) * np.array([1.0, little, 0.5])
+        truth = np.array([apart + 0.5 * both, -apart + 0.5 * both, third])
+        runs.append(
+            Parabola(truth + np.linalg.cholesky(np.linalg.inv(A)) @ random.standard_normal(3), 0.0, np.zeros(3), A)
+        )
+    V, usual = 4.0 * np.eye(3), np.full(3, 0.5)
+    alone, (found, _) = learn_scatter(runs, V, Scatter(usual)), learn_scatter_together(runs, V, usual, A[None])
+    assert log_evidence(runs, V, found) > log_evidence(runs, V, alone) + 10.0
+    sums = [np.sqrt(np.array([1, 1, 0]) @ one.covariance @ np.array([1, 1, 0])) for one in (alone, found)]
+    assert sums[1] == pytest.approx(little, rel=0.4)
+    assert sums[0] > 2.0 * sums[1]
+    assert np.sqrt(found.covariance[0, 0]) == pytest.approx(1.0, rel=0.3)
+
+
+def test_numbers_that_scatter_by_themselves_have_no_effect_together():
+    random, A = np.random.default_rng(6), np.diag([30.0, 40.0, 20.0])
+    runs = [Parabola(random.standard_normal(3), 0.0, np.zeros(3), A) for _ in range(60)]
+    found, _ = learn_scatter_together(runs, np.eye(3), np.ones(3), A[None])
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(np.ones(3), rel=0.3)
+
+
+def test_a_scatter_is_its_covariance():
+    random = np.random.default_rng(8)
+    root = random.standard_normal((4, 4))
+    root[2] = 0.0
+    C = root @ root.T
+    found, x = Scatter.of(C), random.standard_normal(4) * (np.arange(4) != 2)
+    places = [0, 1, 3]
+    assert found.covariance == pytest.approx(C)
+    assert found.distance(x) == pytest.approx(x[places] @ np.linalg.solve(C[np.ix_(places, places)], x[places]))
+    one = Parabola(np.zeros(4), 0.0, random.standard_normal(4), np.diag([2.0, 1.0, 3.0, 5.0]))
+    own = run_values(one, np.zeros(4), found)
+
+    def cost(x):
+        return one.at_place(x) + found.distance(x)
+
+    assert own[2] == 0.0
+    assert all(
+        cost(own + 0.01 * (np.arange(4) == k)) > cost(own) < cost(own - 0.01 * (np.arange(4) == k)) for k in places
+    )
+
+
+@given(st.integers(0, 10_000), st.floats(0.1, 50.0))
+def test_a_step_that_is_shortened_leads_down_and_no_number_further_than_it_may(seed, far):
+    random = np.random.default_rng(seed)
+    root, most = random.standard_normal((5, 5)), random.uniform(0.5, 3.0, 5)
+    H, best = root @ root.T + 1e-3 * np.eye(5), far * random.standard_normal(5)
+    step = shortened(best, most)
+    assert (np.abs(step) <= most * (1.0 + 1e-9)).all()
+    assert (step - best) @ H @ (step - best) < best @ H @ best
 
 
 @pytest.mark.parametrize(("common", "own", "kind"), [(1.5, 0.2, "together"), (0.0, 1.2, "apart")])
 def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
     random, asked = (
         np.random.default_rng(5),
-        engine(12, session=np.array([0.0, 0.0, 0.8]), scatter=np.array([0.0, 0.0, 0.4])),
+        engine(12, session=by_itself(0.8), scatter=by_itself(0.4)),
     )
     runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
     by, _, evidence, *_ = asked._best_sizes(runs, [], np.zeros(3))
@@ -102,7 +176,7 @@ def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
 
 
 def test_deviations_alike_in_all_runs_have_the_prior_of_their_two_levels():
-    by = Deviations(np.diag([0.0, 0.0, 4.0]), np.array([0.0, 0.0, 2.0]))
+    by = Deviations(np.diag([0.0, 0.0, 4.0]), by_itself(2.0))
     shared, own = np.array([0.0, 0.0, 1.0]), np.array([[0.0, 0.0, 3.0], [0.0, 0.0, 1.0]])
     assert by.prior(shared, own, ()) == pytest.approx(1.0 / 4.0 + 1.0)
     assert by.prior(shared, own, (2,)) == pytest.approx(1.0)
@@ -111,7 +185,7 @@ def test_deviations_alike_in_all_runs_have_the_prior_of_their_two_levels():
 @pytest.mark.parametrize("places", [[0], [2], [0, 1], [1, 2]], ids=["label", "force", "labels", "label and force"])
 def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
     random = np.random.default_rng(3)
-    asked = engine(4, V=np.diag([0.1, 0.0, 0.0]), scatter=np.array([0.0, 0.0, 0.3]))
+    asked = engine(4, V=np.diag([0.1, 0.0, 0.0]), scatter=by_itself(0.3))
     runs, shared = [run_at(random.normal(size=3), 0.3) for _ in range(4)], random.normal(size=3)
     by, at, evidence, mean, sd = asked._best_sizes(runs, places, shared)
     nat = []
@@ -258,7 +332,7 @@ def test_a_step_into_a_place_that_is_worse_by_its_own_filter_is_searched_by_that
     at, limits = np.zeros(3), (np.full(3, -20.0), np.full(3, 20.0))
     runs = [replace(about(at, at + 5.0), filtered=SimpleNamespace()) for _ in range(2)]
     observer = SimpleNamespace(each=lambda asked, places: [asked(n) for n in places])
-    search = Searched(observer, LABELS, runs, np.zeros(3), 1.0, np.eye(3), limits, healthy().errors, 1.0)
+    search = Searched(observer, LABELS, runs, Scatter(np.zeros(3)), 1.0, np.eye(3), limits, healthy().errors, 1.0)
     values, own, gain = search.along(at, np.tile(at, (2, 1)), Pooled.of(runs, np.eye(3)))
     assert gain > 0.0
     assert 0.5 < values[0] <= 1.5

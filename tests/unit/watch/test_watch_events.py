@@ -8,7 +8,7 @@ import pytest
 
 from glider.tools.inference.expansion import Expansion
 from glider.tools.inference.parameters import NUISANCE, FreeParameter
-from glider.tools.inference.pooled import log_evidence, marginalised
+from glider.tools.inference.pooled import Scatter, log_evidence, marginalised
 from glider.tools.inference.shared_parameters import SharedParameters
 from glider.tools.watch.events import GROWING, STEP, Joint, Span, spans
 from glider.tools.watch.flights import LEAST_SIZE, RunEnsemble
@@ -108,7 +108,7 @@ def test_runs_that_differ_by_themselves_are_no_events():
     quiet, scattered = (runs_of(np.zeros((RUNS, len(FREE))), COMMON, 7, scatter=s) for s in (0.0, 0.3))
     sizes = learn_scatter(scattered[:5], SHARED)
     assert best(Joint(SHARED, scattered, [])).evidence > 20.0  # were nothing known of it
-    known = [marginalised(one, sizes) for one in scattered]
+    known = [marginalised(one, Scatter(sizes)) for one in scattered]
     assert best(Joint(SHARED, known, [])).evidence < 10.0
     assert learn_scatter(quiet[:5], SHARED)[1] < 0.3 * sizes[1]
 
@@ -116,7 +116,7 @@ def test_runs_that_differ_by_themselves_are_no_events():
 def test_deviations_integrated_out_are_those_of_the_marginal():
     run = runs_of(np.zeros((1, len(FREE))), COMMON, 8)[0]
     sizes = np.array([0.2, 0.1, 0.3, 0.05])
-    made = marginalised(run, sizes)
+    made = marginalised(run, Scatter(sizes))
     rng = np.random.default_rng(1)
     x = COMMON + 0.05 * rng.standard_normal(len(FREE))
     drawn = x + sizes * rng.standard_normal((200_000, len(FREE)))
@@ -126,7 +126,7 @@ def test_deviations_integrated_out_are_those_of_the_marginal():
     shift = x - made.at
     closed = made.value + 2.0 * made.slope @ shift + shift @ made.curvature @ shift
     assert closed == pytest.approx(sampled, abs=0.3)
-    assert log_evidence([run], np.diag(SHARED.prior**2), sizes) < 0.0
+    assert log_evidence([run], np.diag(SHARED.prior**2), Scatter(sizes)) < 0.0
 
 
 def test_no_event_before_it_may_begin_nor_at_a_run_that_was_not_judged():
