@@ -225,7 +225,7 @@ class Watch(WatchedRuns):
         runs = self.observer.each(
             lambda n: self.again(n, best.sessions, span, place, best.event.size, warm, every=True), range(*span)
         )
-        there = dict(zip(range(*span), self.together.marginal(runs), strict=True))
+        there = dict(zip(range(*span), self.of_shared(runs), strict=True))
         gain, size = self.label_gains(*summed(one.alone(*span) for one in self.pooled(best.sessions, there)))
         predicted = best.score + gain - gain[place]
         predicted[place] = -np.inf

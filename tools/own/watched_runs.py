@@ -69,12 +69,17 @@ class WatchedRuns(Engine):
         later = self.observer.each(lambda n: self.about(n, shared, shared, columns).at, range(self.learned, self.count))
         self.found = self.expansions(np.array([*own, *later]), every)
         self.reach = np.sqrt(np.mean([one.reach for one in self.found], axis=0))
-        self.runs = self.together.marginal(self.found)
-        known = [one.tempered(healthy.run_inflation) for one in self.runs[: self.learned]]
+        self.runs = self.of_shared(self.found)
+        known = self.runs[: self.learned]
         M = Pooled.of(known, self.together.V).covariance()
         self.events, self.sessions = list[Event](), [Session(self.learned, self.count, shared, M, shared)]
         self.another = of_another(known, healthy.V, healthy.session)
         self.instead = dict[int, dict[str, float]]()  # by first run of a session: probabilities of labels in its place
+
+    def of_shared(self, found: Sequence[Expansion]) -> list[Expansion]:
+        """What runs say of values that runs share, their own deviations integrated out: less than their likelihood has
+        it, by `run_inflation`."""
+        return [one.tempered(self.healthy.run_inflation) for one in self.together.marginal(found)]
 
     def _with_filter(self, n: int, own: np.ndarray, columns: np.ndarray) -> Expansion:
         return self.expansion_of(n, own[n], columns, keep_filter=True)
@@ -198,7 +203,7 @@ class WatchedRuns(Engine):
                     self.again, sessions=sessions, span=span, label=label, size=size, warm=warm, kept=kept
                 )
                 again = self.observer.each(with_it, moved)
-                runs = dict(zip(moved, self.together.marginal(again), strict=True))
+                runs = dict(zip(moved, self.of_shared(again), strict=True))
             pooled = self.pooled(sessions, runs)
             density = sum(one.log_density(*span, label, size) for one in pooled)
             gain = np.inf if best is None else density - best.log_density
@@ -253,4 +258,4 @@ class WatchedRuns(Engine):
 
         for n, found in zip(moved, self.observer.each(again, moved), strict=True):
             self.found[n] = found
-            (self.runs[n],) = self.together.marginal([found])
+            (self.runs[n],) = self.of_shared([found])
