@@ -232,6 +232,8 @@ def learn_scatter_together(
     A = np.where(np.outer(usual, usual) > 0.0, A, 0.0)
     of_sizes = np.einsum("k,ykk->y", alone.sizes**2, A)
     seen, every = of_sizes > 0.0, np.full(len(of_sizes), np.inf)
+    if np.count_nonzero(usual) < 2 or not seen.any():  # a single number does what its size says
+        return alone, every
     A, most, least = A[seen], of_sizes[seen], np.broadcast_to(least, of_sizes.shape)[seen]
     tried = [np.maximum(share * most, least) for share in EFFECTS]
     begin = max(tried, key=lambda effects: runs.log_likelihood(_together(alone.sizes, A, effects)))

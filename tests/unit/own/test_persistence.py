@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from glider.tools.inference.pooled import Pooled
+from glider.tools.inference.pooled import Pooled, Scatter
 from glider.tools.own.persistence import ChannelScores, persistence
 
 RUNS, WINDOWS, NUMBERS = 200, 10, 4
@@ -21,7 +21,7 @@ def runs() -> list[ChannelScores]:
 
 
 def test_each_channel_has_the_inflation_of_its_own_errors(runs):
-    found = persistence(runs, 100.0 * np.eye(NUMBERS), np.zeros(NUMBERS), np.ones(NUMBERS, dtype=bool))
+    found = persistence(runs, 100.0 * np.eye(NUMBERS), Scatter(np.zeros(NUMBERS)), np.ones(NUMBERS, dtype=bool))
     assert found == pytest.approx(1.0 + WINDOWS * COMMON**2, rel=0.25)
 
 
@@ -32,14 +32,14 @@ def test_what_a_run_has_of_its_own_is_no_error_of_its_windows(runs):
         own = scatter * rng.normal(size=NUMBERS)
         shifted.append(ChannelScores(one.at, one.slope + one.curvature @ own, one.curvature))
     of, V = np.array([True, True, True, False]), 100.0 * np.eye(NUMBERS)
-    assert persistence(shifted, V, scatter, of)[0] < 1.5
-    assert persistence(shifted, V, np.zeros(NUMBERS), of)[0] > 3.0
+    assert persistence(shifted, V, Scatter(scatter), of)[0] < 1.5
+    assert persistence(shifted, V, Scatter(np.zeros(NUMBERS)), of)[0] > 3.0
 
 
 def test_shared_values_are_as_uncertain_as_they_scatter(runs):
     """About the truth, 0, by a channel whose errors repeat: chi-square of the pooled values is their number."""
     V = 100.0 * np.eye(NUMBERS)
-    found = persistence(runs, V, np.zeros(NUMBERS), np.ones(NUMBERS, dtype=bool))
+    found = persistence(runs, V, Scatter(np.zeros(NUMBERS)), np.ones(NUMBERS, dtype=bool))
 
     def surprise(inflation: np.ndarray) -> float:
         total = 0.0
