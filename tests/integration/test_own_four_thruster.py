@@ -11,8 +11,9 @@ from glider.tools.own.identify import identify
 from glider.tools.own.load import read_own
 from glider.tools.own.observer import Observer
 from glider.tools.own.runs import load_own_runs
+from glider.tools.own.watch import watch
 
-pytestmark = pytest.mark.computes(seconds=15)
+pytestmark = pytest.mark.computes(seconds=120)
 
 ROOT = Path(__file__).resolve().parents[2]
 HAIZHE = ROOT / "docs" / "examples" / "four_thruster_auv" / "haizhe.toml"
@@ -50,11 +51,28 @@ def test_thrust_voltage_and_weight_take_it_down(vehicle):
     assert depth(vehicle, 1198.0, net_buoyancy=lighter) > usual + 0.1
 
 
-@pytest.mark.skipif(not DIVES.is_dir(), reason="the recordings are not here")
-def test_dives_that_were_left_out_are_predicted_and_a_load_is_seen_against_the_command(vehicle, tmp_path):
+@pytest.fixture(scope="module")
+def identified(vehicle, tmp_path_factory):
+    """The vehicle identified from every second dive of a session, and the session's dives."""
+    if not DIVES.is_dir():
+        pytest.skip("the recordings are not here")
     normal = load_own_runs(DIVES / "normal_a", vehicle.declared)
-    write(identify(vehicle, [normal[::2]]), tmp_path)
-    model = read_own(tmp_path / VEHICLE)
+    folder = tmp_path_factory.mktemp("identified")
+    write(identify(vehicle, [normal[::2]]), folder)
+    return read_own(folder / VEHICLE), normal
+
+
+def test_further_dives_of_a_session_are_nothing_new_and_dives_with_a_load_are(identified):
+    model, normal = identified
+    loaded = load_own_runs(DIVES / "addweight", model.declared)[:3]
+    found = watch(model, [*normal[1::2][-5:], *loaded], normal[::2])
+    begins = [one.first for one in found.events] + [found.names.index(one["from_run"]) for one in found.sessions]
+    assert set(begins) == {5}
+    assert not (found.strange[:5] > 0.5).any()
+
+
+def test_dives_that_were_left_out_are_predicted_and_a_load_is_seen_against_the_command(vehicle, identified):
+    model, normal = identified
     place = model.declared.index("outputs", "depth")
 
     def errors(runs) -> np.ndarray:

@@ -107,7 +107,9 @@ def watch(vehicle: Any, case: Path, reference: Path | None, out: Path | None, as
         causes = ", ".join(f"{one['label']} {_size(one)}" for one in run["causes"][:2])
         click.echo(f"{run['run']:<12} {run['verdict']:8} gap {run['gap']:6.2f}  {causes}".rstrip())
     click.echo("")
-    if not answer["events"]:
+    for session in answer["sessions"]:
+        click.echo(f"another session begins with {session['from_run']}: what changed with it may be no more than that")
+    if not answer["events"] and not answer["sessions"]:
         click.echo("nothing changed, as far as these runs can show")
     for event in answer["events"]:
         until = "and is still there" if event["to_run"] is None else f"to {event['to_run']}"

@@ -278,17 +278,19 @@ class Watch(WatchedRuns):
         return found
 
     def differences(self) -> list[dict[str, Any]]:
-        """Sessions of the runs that are watched, and what each differs by from the reference most clearly."""
+        """Sessions of the runs that are watched, and by what each differs from the reference more than sessions do."""
         first, found = self.sessions[0], []
         for one in self.pooled(self.sessions[1:]):
             value, sd = one.session.mean + one.mean - first.values, np.sqrt(np.maximum(np.diag(one.M + first.V), 0.0))
-            clear = np.abs(value) / np.hypot(sd, np.maximum(self.together.scatter.sizes, 1e-9))
+            usual = np.hypot(sd, np.sqrt(2.0) * self.healthy.session.sizes)  # of two sessions
+            sigmas = np.abs(value) / np.maximum(usual, 1e-9)
             rows = []
-            for k in np.argsort(-np.where(self.healthy.session.sizes > 0.0, clear, 0.0))[:SHOWN]:
+            for k in np.argsort(-np.where(self.healthy.session.sizes > 0.0, sigmas, 0.0))[:SHOWN]:
                 effect = self.healthy.effects[k]
                 low, high = ((value[k] + side * NINETY * sd[k]) * effect.spread for side in (-1.0, 1.0))
                 rows.append({"name": effect.label, "difference": float(value[k] * effect.spread),
-                             "ci90": [float(low), float(high)], "unit": effect.unit})  # fmt: skip
+                             "ci90": [float(low), float(high)], "unit": effect.unit,
+                             "sigmas": float(sigmas[k])})  # fmt: skip
             likely = sorted(self.instead.get(one.session.first, {}).items(), key=lambda item: -item[1])
             found.append({"from_run": self.name(one.session.first), "differences": rows,
                           "labels": {label: p for label, p in likely if p > LEAST_SHOWN}})  # fmt: skip
@@ -366,9 +368,12 @@ def watch(
 
 def _said(session: dict[str, Any]) -> str:
     """What a session differs by, in words, and the change that it may be instead."""
-    differs = ", ".join(f"{one['name']} {one['difference']:+.2g} {one['unit']}" for one in session["differences"])
+    differs = ", ".join(
+        f"{one['name']} {one['difference']:+.2g} {one['unit']} ({one['sigmas']:.1f} sigma)"
+        for one in session["differences"]
+    )
     change = sum(session["labels"].values())
     if change < MENTIONED:
-        return f"{differs}, as sessions differ"
+        return f"{differs}, of what sessions differ by"
     labels = ", ".join(f"{label} {p:.2f}" for label, p in list(session["labels"].items())[:SHOWN])
-    return f"{differs}, as sessions differ; or something changed too, with probability {change:.2f}: {labels}"
+    return f"{differs}, of what sessions differ by; or something changed too, with probability {change:.2f}: {labels}"
