@@ -131,7 +131,7 @@ class Watch(WatchedRuns):
             return np.array([self.span_prior(*span, sessions) for span in some])[:, None] - np.log(self.named)
 
         while spans and len(self.events) < MOST_EVENTS:
-            self.settle()
+            self.converge()
             others = self.others()
             other, with_other = self.new_session(others)
             # a label alone over every span, and beside another session that begins with it

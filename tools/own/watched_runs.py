@@ -20,7 +20,7 @@ from glider.tools.own.sessions import Session, SessionRuns, of_another
 from glider.tools.own.watched import Event
 
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
-LED_ROUNDS, SETTLED, PREPARED = 8, 4, 20
+LED_ROUNDS, SESSION_ROUNDS, PREPARED = 8, 4, 20
 
 Warm = dict[int, tuple[np.ndarray, np.ndarray]]  # run: most probable values (k,) last, and those about which
 
@@ -230,12 +230,12 @@ class WatchedRuns(Engine):
         """Mean square that a run leaves about where it was expanded, in units of what healthy runs leave."""
         return float(self.found[n].squares.sum() / max(1, self.found[n].samples.sum()))
 
-    def settle(self) -> None:
+    def converge(self) -> None:
         """Every session that is known led to where it is most probable, events being what they are: what further labels
         and sessions are compared with."""
         for first in [one.first for one in self.sessions if one.end > one.first]:
             before = -np.inf
-            for _ in range(SETTLED):
+            for _ in range(SESSION_ROUNDS):
                 found = self.led((0, 0), self.sessions, leading=first)
                 self.take(found.sessions)
                 if found.log_density < before + CONVERGED_GAIN:
