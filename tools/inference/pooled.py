@@ -22,8 +22,8 @@ from glider.tools.inference.hyperparameters import HEALTHY
 
 LEAST_VARIANCE, MOST_VARIANCE = 1e-12, 1e6  # squared spreads
 STARTS = (0.0, 0.03, 0.3)  # spreads, at least: of scatter, from which the most probable is looked for
-EFFECTS = np.geomspace(1e-4, 1.0, 9)  # of deviations all together, over what their sizes alone would do, to begin with
-LEAST_EFFECT, MOST_EFFECT = 1e-6, 100.0  # over what sizes alone would do
+# effects of deviations all together, over what their sizes alone would do: to begin with, and limits
+FIRST_EFFECTS, EFFECT_LIMITS = np.geomspace(1e-4, 1.0, 9), (1e-6, 100.0)
 ITERATIONS, CONVERGED_LOG_VARIANCE = 200, 1e-3  # at most; e-folds of a variance by which a step moves none any more
 
 
@@ -234,12 +234,10 @@ def learn_scatter_together(
     seen, every = of_sizes > 0.0, np.full(len(of_sizes), np.inf)
     if np.count_nonzero(usual) < 2 or not seen.any():  # a single number does what its size says
         return alone, every
-    A, most, least = A[seen], of_sizes[seen], np.broadcast_to(least, of_sizes.shape)[seen]
-    tried = [np.maximum(share * most, least) for share in EFFECTS]
+    (low, high), A, most, least = EFFECT_LIMITS, A[seen], of_sizes[seen], np.broadcast_to(least, of_sizes.shape)[seen]
+    tried = [np.maximum(share * most, least) for share in FIRST_EFFECTS]
     begin = max(tried, key=lambda effects: runs.log_likelihood(_together(alone.sizes, A, effects)))
-    scores, together, effects = runs.led(
-        alone.sizes, A, begin, np.maximum(least, LEAST_EFFECT * most), MOST_EFFECT * most
-    )
+    scores, together, effects = runs.led(alone.sizes, A, begin, np.maximum(least, low * most), high * most)
     if scores <= runs.log_posterior(alone):
         return alone, every
     every[seen] = effects
