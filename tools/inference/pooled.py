@@ -254,6 +254,7 @@ def _together(sizes: np.ndarray, A: np.ndarray, effects: np.ndarray) -> Scatter:
 
 
 def _parts(found: Sequence[Parabola], sessions: Sequence[int] | None) -> list[Sequence[Parabola]]:
+    """Runs of each session, all one where no counts of successive runs are given."""
     ends = np.cumsum(sessions or [len(found)])
     return [found[a:b] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
 

@@ -53,9 +53,9 @@ def persistence(runs: Sequence[ChannelScores], V: np.ndarray, scatter: Scatter, 
     """Variance inflation (y,) of what runs say channel by channel, at least 1: variance of their scores over what
     independent errors would have, median over some values.
 
-    Scores are taken at each run's most probable deviations from what all runs share (prior
-    V: k, k). With H_y the curvature of a channel and M the covariance of the deviations, independent errors' would have
-    the variance H_y - H_y M H_y; of (k,), bool: the values that count.
+    Scores are taken at each run's most probable deviations from what all runs share (prior V: k, k). With H_y the
+    curvature of a channel and M the covariance of the deviations, independent errors' would have the variance
+    H_y - H_y M H_y; of (k,), bool: the values that count.
     """
     found = np.ones(len(runs[0].slope))
     for _ in range(PERSISTENCE_ROUNDS):

@@ -33,7 +33,7 @@ from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.sessions import Session, SessionRuns, split
 from glider.tools.own.strong import STRONG_LEFT, strong_sizes
-from glider.tools.own.watched import CERTAIN, Event, Watched
+from glider.tools.own.watched import CERTAIN, Event, Watched, likeliest
 from glider.tools.own.watched_runs import Warm, WatchedRuns
 
 LEARNED = 4  # first runs, from which a watch without a reference learns
@@ -46,7 +46,7 @@ MOST_EVENTS = 4
 REFITTED, SPANS = 5, 4  # labels by the parabola about no label, over the best spans
 UNLIKELY = 7.0  # nat behind the best by the parabola there: not refitted
 SHOWN = 3  # numbers that a session differs by, labels that it may be instead
-LEAST_SHOWN, MENTIONED = 0.005, 0.05  # probability of a label, and of all together in words
+MENTIONED = 0.05  # probability that something changed where a session begins, from which its caution says so
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,8 @@ class Watch(WatchedRuns):
         """The likeliest of further sessions, where it is most probable: its log odds."""
         if not others:
             return -np.inf, self.sessions
-        _, likeliest = max(others, key=lambda one: one[0])
-        at = self.led((0, 0), self.expanded(likeliest))
+        _, further = max(others, key=lambda one: one[0])
+        at = self.led((0, 0), self.expanded(further))
         return self.session_gain(at.pooled, at.sessions), at.sessions
 
     def search(self) -> None:
@@ -291,9 +291,8 @@ class Watch(WatchedRuns):
                 rows.append({"name": effect.label, "difference": float(value[k] * effect.spread),
                              "ci90": [float(low), float(high)], "unit": effect.unit,
                              "sigmas": float(sigmas[k])})  # fmt: skip
-            likely = sorted(self.instead.get(one.session.first, {}).items(), key=lambda item: -item[1])
-            found.append({"from_run": self.name(one.session.first), "differences": rows,
-                          "labels": {label: p for label, p in likely if p > LEAST_SHOWN}})  # fmt: skip
+            labels = likeliest(self.instead.get(one.session.first, {}))
+            found.append({"from_run": self.name(one.session.first), "differences": rows, "labels": labels})
         return found
 
 

@@ -1,7 +1,8 @@
 """The answer of a watch of a user's vehicle: events, sessions, what is said of every run."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,6 +11,14 @@ from glider.tools.own.decision import UNKNOWN, Healthy, confounded, group_of
 from glider.tools.own.effects import UNEXPLAINED
 
 CERTAIN = 0.5  # probability from which an event is one
+LEAST_LISTED = 0.005  # probability of a label or a place
+
+K = TypeVar("K")
+
+
+def likeliest(chances: Mapping[K, float]) -> dict[K, float]:
+    """Probabilities that are listed, the largest first."""
+    return {one: p for one, p in sorted(chances.items(), key=lambda item: -item[1]) if p > LEAST_LISTED}
 
 
 @dataclass
@@ -78,9 +87,8 @@ class Watched:
             places[where] = places.get(where, 0.0) + p
         return {
             "label": one.label if known else None, "group": group, "probability": one.probability,
-            "labels": {label: p for label, p in sorted(one.chances.items(), key=lambda item: -item[1]) if p > 0.005},
-            "where": [{"subsystem": s, "element": e, "probability": p}
-                      for (s, e), p in sorted(places.items(), key=lambda item: -item[1]) if p > 0.005],
+            "labels": likeliest(one.chances),
+            "where": [{"subsystem": s, "element": e, "probability": p} for (s, e), p in likeliest(places).items()],
             "from_run": self.names[one.first],
             "to_run": None if one.end == len(self.names) else self.names[one.end - 1],
             "course": "step" if one.end == len(self.names) else "episode",
