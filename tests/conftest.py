@@ -71,28 +71,13 @@ def pytest_xdist_make_scheduler(config, log):
     return ByFile(config, log)
 
 
-thaw = gc.unfreeze
-frozen = False
+# What stands before the first test is no garbage, and half a million objects: a flight that arms has all that is not
+# frozen collected, a tenth of a second each time. In tests what is frozen stays so.
+gc.unfreeze = lambda: None
 
 
-def unfreeze() -> None:
-    """gc.unfreeze, remembered: to count what is frozen goes through all of it, a thirtieth of a second a test."""
-    global frozen
-    frozen = False
-    thaw()
-
-
-gc.unfreeze = unfreeze
-
-
-def pytest_runtest_setup(item):
-    """What stands before the first test, and again after one that thawed it, is no garbage: a flight that arms has it
-    collected, and half a million objects of the tests' own are a tenth of a second each time.
-    """
-    global frozen
-    if not frozen:
-        gc.freeze()
-        frozen = True
+def pytest_collection_finish():
+    gc.freeze()
 
 
 ROOT = Path(__file__).resolve().parents[1]
