@@ -19,6 +19,7 @@ BLIMP = EXAMPLES / "gliding_blimp" / "rgblimp.toml"
 AUV = EXAMPLES / "four_thruster_auv" / "haizhe.toml"
 MOVED = 8  # the spiral from which on the blimp's mass is moved
 LOADED = 6  # dives with a load that follow normal ones
+READ_OFF, OFF_M = 5, 0.1  # the dive of a session from which on its depth is read so much off
 
 
 def recorded(folder: Path) -> list[Path]:
@@ -105,20 +106,28 @@ def blimp(data: Path, out: Path) -> None:
 
 
 def auv(data: Path, out: Path) -> None:
-    """The AUV: each normal session's other dives, then dives with a load or a damaged propeller of other sessions."""
+    """The AUV: each normal session's other dives, with their depth read off from one on, and before dives with a load
+    or a damaged propeller of other sessions."""
     sessions = {name: recorded(data / f"normal_{name}") for name in "abc"}
     for name, runs in sessions.items():
         copied(out / f"reference-{name}", runs[::2])
     healthy = [f"reference-{name}" for name in sessions]
     asked(out, "identify", "identify", *healthy, "--vehicle", AUV, "--out", "identified")
+
+    def ask(case: str, after: str, first: int) -> None:
+        answer = asked(out, f"said-{case}", "gap", "watch", case, "--reference", f"reference-{after}",
+                       "--vehicle", "identified/identified.toml")  # fmt: skip
+        print(f"{case}, from run {first} on:", said(answer), flush=True)
+
+    for name, runs in sessions.items():
+        copied(out / f"{name}-depth", runs[1::2], "depth_m", lambda value: value + OFF_M, READ_OFF)
+        ask(f"{name}-depth", name, READ_OFF)
     others = {"load": recorded(data / "addweight"), "damage": recorded(data / "damage_b")}
     for after, further in others.items():
         for name, runs in sessions.items():
             case = f"{name}-{after}"
             copied(out / case, [*runs[1::2], *further[:LOADED]])
-            answer = asked(out, f"said-{case}", "gap", "watch", case, "--reference", f"reference-{name}",
-                           "--vehicle", "identified/identified.toml")  # fmt: skip
-            print(f"{case}, from run {len(runs[1::2])} on:", said(answer), flush=True)
+            ask(case, name, len(runs[1::2]))
 
 
 def main() -> None:
