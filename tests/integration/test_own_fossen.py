@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glider.tools.own.decision import NONE
+from glider.tools.own.declare import with_groups
 from glider.tools.own.load import read_own
 from tests.support.own_cases import FOSSEN, answers, diagnosed, fly, identified, size_of
 
@@ -69,9 +70,23 @@ def test_one_input_late_is_not_all(known):
     assert chance > 0.9
 
 
-def shifted(vehicle, run, late: float) -> np.ndarray:
-    """Outputs of a run read `late` seconds later than they are stamped."""
+def test_a_device_that_is_late_is_one_cause_where_the_file_says_what_it_reads(known):
+    imu = [one.name for one in known.declared.outputs if one.unit.startswith("rad")]
+    runs = [replace(run, outputs=shifted(known, run, 0.3, imu)) for run in fly(known, 17, {})]
+    grouped = replace(known, declared=with_groups(known.declared, {"imu": imu}))
+    answer = diagnosed(grouped, runs)
+    found, chance = first(answer)
+    assert found == "imu_delay"
+    assert chance > 0.9
+    assert size_of(answer, found)[0] == pytest.approx(0.3, abs=0.05)
+    unasked = replace(grouped, declared=replace(grouped.declared, odds={"imu_delay": 0.0}))
+    assert first(diagnosed(unasked, runs))[0] != "imu_delay"
+
+
+def shifted(vehicle, run, late: float, names=None) -> np.ndarray:
+    """Outputs of a run, those of some names, read `late` seconds later than they are stamped."""
     found = [np.interp(run.t - late, run.t, np.unwrap(y) if one.angle else y)
+             if names is None or one.name in names else y
              for one, y in zip(vehicle.declared.outputs, run.outputs.T, strict=True)]  # fmt: skip
     return np.array(found).T
 

@@ -132,7 +132,8 @@ class Posterior:
 def log_odds(effect: Effect) -> float:
     """Log prior odds of a label to one of an input or an output."""
     drifts = effect.family == OUTPUT and effect.kind == "drift"
-    return float(np.log(DRIFT_ODDS if drifts else FAMILY_ODDS.get(effect.family, 1.0)))
+    odds = effect.odds * (DRIFT_ODDS if drifts else FAMILY_ODDS.get(effect.family, 1.0))
+    return float(np.log(odds)) if odds > 0.0 else -np.inf
 
 
 def form_variance(healthy: Healthy, reach: float, moved: float) -> float:

@@ -34,6 +34,8 @@ DERIVED = {
     "noises": ("noise", "oscillation"),
 }
 ALL_INPUTS, COMMON_KINDS = "inputs", ("lag", "delay")  # what a chain of commands, or a clock, does to all inputs
+# what one cause does to all of a group alike: a device to what it reads, a supply to what it drives
+GROUP_KINDS = "gain", "lag", "delay"
 # unit: tolerance of an output, standard deviation of a state at the start
 USUAL_TOLERANCE = {"m": 0.1, "rad": 0.0349, "rad/s": 0.0349, "m/s": 0.05, "m/s2": 0.1}
 USUAL_START = {"m": 0.1, "rad": 0.1, "rad/s": 0.1, "m/s": 0.2}
@@ -125,10 +127,22 @@ class Declaration:
     input_shares: Mapping[str, float] = field(default_factory=dict)  # in such points, of inputs under one command
     effects: Mapping[str, float] = field(default_factory=dict)  # labels that the vehicle itself has, in their units
     operating_points: tuple[tuple[float, ...], ...] = ()  # mean inputs of runs, where forces are known of their own
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # names in one list that a cause has in common
+    odds: Mapping[str, float] = field(default_factory=dict)  # prior odds of labels against what is usual
 
     def index(self, what: str, name: str) -> int:
         """Place of a name in a list, `inputs` to `noises`; KeyError where it is not there."""
         return self._places[what][name]
+
+    def members(self, what: str, name: str) -> list[int]:
+        """Places in a list of what a name means: one entry, a group's, or all inputs."""
+        if name == ALL_INPUTS:
+            return list(range(len(self.inputs)))
+        return [self.index(what, one) for one in self.groups.get(name, (name,))]
+
+    def groups_of(self, what: str) -> list[str]:
+        """Names of the groups of a list's entries."""
+        return [name for name, members in self.groups.items() if members[0] in self._places[what]]
 
     @cached_property
     def _places(self) -> dict[str, dict[str, int]]:
@@ -225,6 +239,29 @@ def declaration(model: Any) -> Declaration:
             what = f"{one.name} is what a cause of {derived[one.name]} is called; another name keeps them apart"
             raise DeclarationError(f"parameters: {what}")
     return Declaration(**lists, horizon=getattr(model, "horizon", None))
+
+
+def with_groups(declared: Declaration, groups: Mapping[str, Sequence[str]]) -> Declaration:
+    """A declaration with groups of its inputs, outputs or parameters; DeclarationError where one cannot be."""
+    lists = {one.name: what for what in ("inputs", "outputs", "parameters") for one in getattr(declared, what)}
+    taken = {*lists, *(one.name for one in declared.noises), ALL_INPUTS}
+    taken |= {f"{one.name}_{kind}" for what, kinds in DERIVED.items() for one in getattr(declared, what)
+              for kind in kinds}  # fmt: skip
+    for name, members in groups.items():
+        for one in members:
+            if one not in lists:
+                raise DeclarationError(f"groups.{name}: no input, output or parameter of the model: {one}")
+            if lists[one] != lists[members[0]]:
+                raise DeclarationError(f"groups.{name}: {members[0]} is of the {lists[members[0]]}, {one} is not")
+            if lists[one] == "parameters" and declared.parameters[declared.index("parameters", one)].value == 0.0:
+                raise DeclarationError(f"groups.{name}: {one} is 0: it has no share")
+        if len(set(members)) < len(members):
+            raise DeclarationError(f"groups.{name}: a name stands twice")
+        labels = {name, *(f"{name}_{kind}" for kind in GROUP_KINDS if lists[members[0]] != "parameters")}
+        if not NAME.match(name) or labels & taken:
+            raise DeclarationError(f"groups.{name}: expected a name of letters, digits and _ that nothing else has")
+        taken |= labels
+    return replace(declared, groups={name: tuple(members) for name, members in groups.items()})
 
 
 def _check_parameter(one: Parameter) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from glider.tools.own.declare import ALL_INPUTS, COMMON_KINDS, DERIVED, RUN, Declaration, Input
+from glider.tools.own.declare import ALL_INPUTS, COMMON_KINDS, DERIVED, GROUP_KINDS, RUN, Declaration, Input
 from glider.tools.own.operating_points import point_weights
 from glider.tools.own.runs import OwnRun
 
@@ -23,6 +23,7 @@ NOISE = "noise"  # more of a noise than healthy runs have, or an oscillation: ex
 FORM = "form"
 GAIN_SPREAD, SECONDS_SPREAD, RANGE_SPREAD = 0.1, 0.2, 0.1
 OWN_STEP = 1e-3  # of its sigma: difference step of a parameter of each run
+SHARE = "share"  # kind of a group of parameters: all more by the same share of their values
 LONGEST = 20.0  # spreads: of delays and time constants
 UNKNOWN_SHARE = 0.1  # of a value: spread of a parameter whose uncertainty is smaller
 READ_ROWS = ("gain", "bias", "drift", "lag", "delay")  # rows of `read`'s table
@@ -40,6 +41,7 @@ class Effect:
     spread: float
     low: float = -np.inf  # spreads
     high: float = np.inf
+    odds: float = 1.0  # prior odds by the vehicle file, against what is usual of its family; 0: it is no cause
 
     @property
     def one_sided(self) -> bool:
@@ -99,7 +101,7 @@ def nominal_point(declared: Declaration) -> ModelPoint:
     for label, value in declared.effects.items():
         family, name, kind = labels_of(declared)[label]
         if family == OUTPUT:
-            reading[READ_ROWS.index(kind), declared.index("outputs", name)] += value
+            reading[READ_ROWS.index(kind), declared.members("outputs", name)] += value
         else:
             _drive(declared, driven, name, kind, value)
     return ModelPoint(
@@ -121,17 +123,25 @@ def nominal_point(declared: Declaration) -> ModelPoint:
 
 
 def labels_of(declared: Declaration) -> dict[str, tuple[str, str, str]]:
-    """Family, name and kind of every label of inputs and outputs; of all inputs the name is ALL_INPUTS."""
+    """Family, name and kind of every label of inputs and outputs; of all inputs the name is ALL_INPUTS, of a group its
+    own."""
     lists = (INPUT, declared.inputs, DERIVED["inputs"]), (OUTPUT, declared.outputs, DERIVED["outputs"])
     common = {f"{ALL_INPUTS}_{kind}": (INPUT, ALL_INPUTS, kind) for kind in COMMON_KINDS}
+    common |= {f"{name}_{kind}": (family, name, kind) for family, what in ((INPUT, "inputs"), (OUTPUT, "outputs"))
+               for name in declared.groups_of(what) for kind in GROUP_KINDS}  # fmt: skip
     return common | {f"{one.name}_{kind}": (family, one.name, kind)
                     for family, every, kinds in lists for one in every for kind in kinds}  # fmt: skip
 
 
+def all_labels(declared: Declaration) -> set[str]:
+    """Every label that a cause of the vehicle may have."""
+    parameters = [one.name for one in declared.parameters] + declared.groups_of("parameters")
+    return {*labels_of(declared), *parameters, *(one.label for one in noise_effects(declared))}
+
+
 def _drive(declared: Declaration, driven: dict[int, dict[str, float]], name: str, kind: str, size: float) -> None:
-    """More of what is wrong of an input, or of all, in place."""
-    every = range(len(declared.inputs)) if name == ALL_INPUTS else [declared.index("inputs", name)]
-    for place in every:
+    """More of what is wrong of an input, of a group or of all, in place."""
+    for place in declared.members("inputs", name):
         own = driven.setdefault(place, {})
         own[kind] = own.get(kind, 0.0) + size
 
@@ -139,7 +149,7 @@ def _drive(declared: Declaration, driven: dict[int, dict[str, float]], name: str
 def effects_of(declared: Declaration, point: ModelPoint) -> dict[str, float]:
     """Labels of inputs and outputs that a model has, in their units: what `nominal_point` would make it of.
 
-    What all inputs have is each one's.
+    What a group or all inputs have is each one's.
     """
     none = nominal_point(replace(declared, effects={}))
     read = {f"{one.name}_{kind}": point.reading[row, n] - none.reading[row, n]
@@ -157,11 +167,12 @@ def moved(declared: Declaration, point: ModelPoint, effects: Sequence[Effect], v
             continue
         size = float(value) * effect.spread
         if effect.family == PARAMETER:
-            k = declared.index("parameters", effect.name)
-            one = declared.parameters[k]
-            found.theta[k] = min(max(found.theta[k] + size, one.low), one.high)
+            for k in declared.members("parameters", effect.name):
+                one = declared.parameters[k]
+                more = size * one.value if effect.kind == SHARE else size
+                found.theta[k] = min(max(found.theta[k] + more, one.low), one.high)
         elif effect.family == OUTPUT:
-            found.reading[READ_ROWS.index(effect.kind), declared.index("outputs", effect.name)] += size
+            found.reading[READ_ROWS.index(effect.kind), declared.members("outputs", effect.name)] += size
         elif effect.family == INPUT:
             _drive(declared, found.driven, effect.name, effect.kind, size)
         elif effect.family == PUSH:
@@ -200,9 +211,11 @@ def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: 
     if sum(moving) > 1:  # outputs that all are late look as inputs do; a clock may be early, too
         found += [Effect(f"{ALL_INPUTS}_{kind}", INPUT, ALL_INPUTS, kind, "s", SECONDS_SPREAD,
                          -LONGEST if kind == "delay" else 0.0, LONGEST) for kind in COMMON_KINDS]  # fmt: skip
+    found += _of_groups(declared, moving)
     has = effects_of(declared, nominal_point(declared))
     for n, effect in enumerate(found):
-        of = [one.name for one in declared.inputs] if effect.name == ALL_INPUTS else [effect.name]
+        what = "inputs" if effect.family == INPUT else "outputs"
+        of = [getattr(declared, what)[place].name for place in declared.members(what, effect.name)]
         begins = min(has.get(f"{name}_{effect.kind}", 0.0) for name in of) / effect.spread
         found[n] = replace(effect, low=effect.low - begins, high=effect.high - begins)
     for parameter in declared.parameters:
@@ -211,6 +224,19 @@ def standard_effects(declared: Declaration, runs: Sequence[OwnRun], tolerances: 
         found.append(
             Effect(parameter.name, PARAMETER, parameter.name, "value", parameter.unit, spread, min(low, 0.0), high)
         )
+    found += [Effect(name, PARAMETER, name, SHARE, "1", GAIN_SPREAD) for name in declared.groups_of("parameters")]
+    return [replace(one, odds=declared.odds.get(one.label, 1.0)) for one in found]
+
+
+def _of_groups(declared: Declaration, moving: Sequence[bool]) -> list[Effect]:
+    """Labels of groups of outputs and inputs; moving (inputs,): inputs that never move have no lag."""
+    found = []
+    for family, what in ((INPUT, "inputs"), (OUTPUT, "outputs")):
+        for name in declared.groups_of(what):
+            found.append(Effect(f"{name}_gain", family, name, "gain", "1", GAIN_SPREAD))
+            if family == OUTPUT or any(moving[place] for place in declared.members(what, name)):
+                found += [Effect(f"{name}_{kind}", family, name, kind, "s", SECONDS_SPREAD, 0.0, LONGEST)
+                          for kind in ("lag", "delay")]  # fmt: skip
     return found
 
 
@@ -233,9 +259,10 @@ def unexplained(declared: Declaration, runs: Sequence[OwnRun]) -> list[Effect]:
 def noise_effects(declared: Declaration) -> list[Effect]:
     """Excess noise and an oscillation at every noise: its density, and its amplitude; two of each noise, in order."""
     return [
-        Effect(f"{one.name}_{kind}", NOISE, one.name, kind, one.unit, max(one.density, 1e-6), 0.0)
+        Effect(label, NOISE, one.name, kind, one.unit, max(one.density, 1e-6), 0.0, odds=declared.odds.get(label, 1.0))
         for one in declared.noises
-        for kind in ("noise", "oscillation")
+        for kind in DERIVED["noises"]
+        for label in [f"{one.name}_{kind}"]
     ]
 
 

@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from glider.hal.strict import ConfigError, Table, decode, locate
-from glider.tools.own.declare import Declaration, Parameter
-from glider.tools.own.effects import form_errors, labels_of
+from glider.tools.own.declare import Declaration, DeclarationError, Parameter, with_groups
+from glider.tools.own.effects import all_labels, form_errors, labels_of
 
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -113,6 +113,9 @@ class OwnVehicle(Table):
     noise: dict[str, NoiseTable] = msgspec.field(default_factory=dict)
     start: dict[str, StartTable] = msgspec.field(default_factory=dict)
     effects: dict[str, float] = msgspec.field(default_factory=dict)  # labels of inputs and outputs, SI
+    # outputs of one device, inputs of one supply, parameters that change by the same share
+    groups: dict[str, Annotated[list[str], msgspec.Meta(min_length=2)]] = msgspec.field(default_factory=dict)
+    odds: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of labels as causes; 1: usual, 0: never
     windows: WindowsTable | None = None
     identified: IdentifiedTable | None = None
 
@@ -195,10 +198,18 @@ def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: P
     found = replace(
         declared, **lists, states=tuple(states.values()), horizon=horizon, start=start, effects=given.effects
     )
-    for name in given.effects:
-        if name not in labels_of(found):
-            raise ConfigError(str(source), "no label of the model's inputs and outputs", key=f"effects.{name}",
-                              line=locate(text, ["effects", name]))  # fmt: skip
+    try:
+        found = with_groups(found, given.groups)
+    except DeclarationError as error:
+        key, _, said = str(error).partition(": ")
+        raise ConfigError(str(source), said, key=key, line=locate(text, [*key.split(".")])) from None
+    found = replace(found, odds=given.odds)
+    for table, names, labels, of in (("effects", given.effects, set(labels_of(found)), " of inputs and outputs"),
+                                     ("odds", given.odds, all_labels(found), "")):  # fmt: skip
+        for name in names:
+            if name not in labels:
+                raise ConfigError(str(source), f"the model has no such label{of}", key=f"{table}.{name}",
+                                  line=locate(text, [table, name]))  # fmt: skip
     if given.identified is not None:
         found = _with_form(given.identified, found, str(source))
         _check_identified(given.identified, found, str(source))

@@ -289,7 +289,8 @@ class Observer:
         rows, cuts = self._scored(n, horizon)
         measured, predicted = self.runs[n].outputs[rows], predicted[..., rows, :]
         error = measured - predicted
-        error[..., self.angles] = names.wrap(error[..., self.angles])
+        with np.errstate(invalid="ignore"):  # of a flight that ran away
+            error[..., self.angles] = names.wrap(error[..., self.angles])
         for k in np.flatnonzero(self.angles) if not wrapped else ():
             seen = np.flatnonzero(np.isfinite(measured[:, k]))
             turned = np.any(np.abs(np.diff(error[..., seen, k])) > np.pi, axis=tuple(range(error.ndim - 2)))

@@ -56,7 +56,7 @@ class Engine:
         self.together = Deviations(healthy.V + healthy.session.covariance, healthy.scatter)
         self.apart = Deviations(healthy.V, Scatter.of(healthy.scatter.covariance + healthy.session.covariance))
         # constant numbers that a hypothesis may add; noises are weighed beside them (excess_noise.py)
-        self.candidate = np.array([one.family not in (FORM, NOISE) for one in healthy.effects])
+        self.candidate = np.array([one.family not in (FORM, NOISE) and one.odds > 0.0 for one in healthy.effects])
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
         self.reach = np.zeros(self.k)
         self.level = RunLevel(healthy.errors, healthy.eta, healthy.level_scatter)
@@ -357,7 +357,7 @@ class Engine:
             for place, one in enumerate(noises):
                 for block in blocks_of(place):
                     windows = NoisyWindows(flown, block, self.healthy.errors, self.healthy.eta)
-                    if windows.reach > LEAST_REACH:
+                    if windows.reach > LEAST_REACH and one.odds > 0.0:
                         gain = max(windows.gain(size / windows.reach) for size in SIZES)
                         tried.append((gain - windows.windows * usual.get(one.label, 0.0), one.label, windows))
             tried.sort(key=lambda one: -one[0])

@@ -9,7 +9,7 @@ import numpy as np
 from glider.tools.data.errors import InputError
 from glider.tools.data.sources import read_text
 from glider.tools.own.check import load_own
-from glider.tools.own.declare import USUAL_TOLERANCE
+from glider.tools.own.declare import USUAL_TOLERANCE, Declaration
 from glider.tools.own.effects import noise_effects, standard_effects
 from glider.tools.own.files import is_own
 from glider.tools.own.observers import observer_of
@@ -48,7 +48,8 @@ def describe(file: Path, case: Path | None, compile_observer: Callable[[], None]
         lines.append(f"assumed, not measured: {', '.join(assumed)}")
     runs = [_imagined(declared)] if case is None else load_own_runs(case, declared)
     tolerances = np.array([one.tolerance or USUAL_TOLERANCE.get(one.unit, 1.0) for one in declared.outputs])
-    labels = [one.label for one in [*standard_effects(declared, runs, tolerances), *noise_effects(declared)]]
+    every = [*standard_effects(declared, runs, tolerances), *noise_effects(declared)]
+    labels = [one.label for one in every if one.odds > 0.0]
     lines.append(f"{len(labels)} causes it can have: {', '.join(labels)}")
     if case is not None:
         observer = observer_of(vehicle, runs[:1])
@@ -61,7 +62,7 @@ def describe(file: Path, case: Path | None, compile_observer: Callable[[], None]
             f"{observer.parts} parts a step"
         )
         lines += observer.notes
-    lines += vehicle.notes
+    lines += vehicle.notes + _ungrouped(declared)
     return {
         "name": vehicle.name, "level": vehicle.level, "compiled": bool(vehicle.level and vehicle.kernels.compiled),
         "causes": labels, "notes": vehicle.notes, "lines": lines,
@@ -70,7 +71,18 @@ def describe(file: Path, case: Path | None, compile_observer: Callable[[], None]
     }  # fmt: skip
 
 
-def _imagined(declared) -> OwnRun:
+def _ungrouped(declared: Declaration) -> list[str]:
+    """A line, where outputs of one unit stand in no group: one device may read them."""
+    grouped = {one for members in declared.groups.values() for one in members}
+    by_unit = dict[str, list[str]]()
+    for one in declared.outputs:
+        if one.name not in grouped:
+            by_unit.setdefault(one.unit, []).append(one.name)
+    return [f"if one device reads {', '.join(names)}: with [groups] its delay, lag and gain are causes"
+            for names in by_unit.values() if len(names) > 1]  # fmt: skip
+
+
+def _imagined(declared: Declaration) -> OwnRun:
     """A run in which every input moves: so that every label has its place in the list."""
     t = np.linspace(0.0, 60.0, 61)
     inputs = np.tile(np.linspace(0.0, 1.0, 61)[:, None], (1, len(declared.inputs)))

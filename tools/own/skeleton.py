@@ -76,6 +76,13 @@ tolerance = 0.05                    # what the model may be off: gaps are counte
 [start]                             # what is known of how a run begins; else the first readings say it
 # depth = {{ value = 0.0, uncertainty = 0.02 }}
 
+[groups]                            # what a cause has in common
+# imu = ["yaw", "r"]                # outputs of one device: imu_delay, imu_lag, imu_gain; inputs of one supply likewise
+# drag = ["heave_drag", "yaw_damping"]  # parameters that change by the same share: drag
+
+[odds]                              # of causes, by what you know of them; 1 is usual
+# depth_gain = 0                    # never
+
 [windows]
 seconds = 10.0                      # that gaps are measured on, flown open loop
 """

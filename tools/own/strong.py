@@ -37,7 +37,7 @@ def strong_sizes(
 
     begun, found = float(squares([0], [0.0])[0]), dict[int, tuple[float, float]]()
     ways = {(k, sign): (0, begun) for k, one in enumerate(effects) for sign in (1.0, -1.0)
-            if reach[k] > LEAST_REACH and one.family not in (FORM, NOISE)}  # fmt: skip
+            if reach[k] > LEAST_REACH and one.family not in (FORM, NOISE) and one.odds > 0.0}  # fmt: skip
     for strong in STRONG:
         sizes = {way: way[1] * strong / reach[way[0]] for way in ways}
         sizes = {way: size for way, size in sizes.items() if effects[way[0]].low <= size <= effects[way[0]].high}

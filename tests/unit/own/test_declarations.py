@@ -11,7 +11,8 @@ from glider.hal.strict import ConfigError
 from glider.tools.data.errors import InputError
 from glider.tools.own.cases import own_vehicle
 from glider.tools.own.check import check_model, load_own
-from glider.tools.own.declare import DeclarationError, Output, column_of, declaration
+from glider.tools.own.decision import log_odds
+from glider.tools.own.declare import DeclarationError, Output, column_of, declaration, with_groups
 from glider.tools.own.effects import driven_inputs, effects_of, held_inputs, moved, nominal_point, standard_effects
 from glider.tools.own.runs import OwnRun, load_own_run
 
@@ -95,6 +96,10 @@ def test_an_answer_that_depends_on_earlier_calls_is_a_hidden_state(vehicle):
         ("[sensors.depth]\nnoise = -1.0\n", "sensors.depth.noise"),
         ("[start]\ndeep = { value = 0.0, uncertainty = 0.1 }\n", "start.deep: "),
         ("[parameters.drag]\nlow = 9.0\n", "parameters.drag.value: 4 is outside 9 to inf"),
+        ("[groups]\nhull = ['drag', 'drog']\n", "sinker.toml:4: groups.hull: no input, output or parameter"),
+        ("[groups]\nhull = ['drag', 'depth']\n", "groups.hull: drag is of the parameters, depth is not"),
+        ("[groups]\ndepth = ['drag', 'drag']\n", "groups.depth: a name stands twice"),
+        ("[odds]\ndepth_drift = 0\nfin_gain = 1\n", "sinker.toml:5: odds.fin_gain: the model has no such label"),
     ],
 )
 def test_a_mistake_in_a_vehicle_file_names_key_and_line(vehicle, extra, said):
@@ -133,6 +138,32 @@ def test_a_delay_of_all_inputs_is_each_one_s():
     assert driven_inputs(runs[0], declared, both)[:, 1] == pytest.approx(runs[0].inputs[:, 1])
     still = [replace(runs[0], inputs=runs[0].inputs * [1.0, 0.0])]
     assert "inputs_delay" not in {one.label for one in standard_effects(declared, still, np.ones(1))}
+
+
+def test_a_group_is_its_members_alike():
+    model = SimpleNamespace(
+        inputs={"fin": "rad", "motor": "N"}, outputs={"x": "m", "y": "m", "roll": "rad"},
+        parameters=[("drag", "kg/m", 4.0, 1.0), ("lift", "kg/m", -2.0, 1.0), ("trim", "rad", 0.0, 0.1)],
+        rollout=lambda x0, t, u, theta: None,
+    )  # fmt: skip
+    groups = {"gps": ["x", "y"], "supply": ["fin", "motor"], "hull": ["drag", "lift"]}
+    declared = replace(with_groups(declaration(model), groups), effects={"gps_delay": 0.2}, odds={"hull": 0.0})
+    t = np.arange(20.0)
+    run = OwnRun("run00", t, np.column_stack([np.sin(t), np.cos(t)]), np.zeros((20, 3)))
+    every = {one.label: one for one in standard_effects(declared, [run], np.ones(3))}
+    assert {f"{name}_{kind}" for name in ("gps", "supply") for kind in ("gain", "lag", "delay")} <= set(every)
+    assert every["gps_delay"].low * every["gps_delay"].spread == pytest.approx(-0.2)
+    assert log_odds(every["hull"]) == -np.inf
+    labels, sizes = ["gps_delay", "supply_gain", "hull"], np.array([0.1, -0.3, 0.4])
+    spreads = np.array([every[label].spread for label in labels])
+    there = moved(declared, nominal_point(declared), [every[label] for label in labels], sizes / spreads)
+    assert there.theta == pytest.approx([5.6, -2.8, 0.0])
+    has = effects_of(declared, there)
+    assert has == pytest.approx({"x_delay": 0.3, "y_delay": 0.3, "fin_gain": -0.3, "motor_gain": -0.3})
+    for wrong, said in (({"hull": ["drag", "trim"]}, "trim is 0"), ({"x": ["fin", "motor"]}, "that nothing else has"),
+                        ({"fin": ["x", "y"]}, "that nothing else has")):  # fmt: skip
+        with pytest.raises(DeclarationError, match=said):
+            with_groups(declaration(model), wrong)
 
 
 def test_missing_samples_of_an_interpolated_input_are_drawn_in_straight(vehicle, tmp_path):
