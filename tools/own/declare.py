@@ -121,6 +121,7 @@ class Declaration:
     noises: tuple[Noise, ...] = ()
     horizon: float | None = None  # s: of the windows that gaps are measured on; None: by the model's time constants
     start: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # outputs known at the start: value, 1 sigma
+    start_states: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # states likewise, whatever is read
     # forces at noises that go with inputs, identified: mean and standard deviation of inputs; unit of a noise a unit
     usual_inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     form: Mapping[tuple[str, str], float] = field(default_factory=dict)

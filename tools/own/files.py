@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from glider.hal.strict import ConfigError, Table, decode, locate
-from glider.tools.own.declare import Declaration, DeclarationError, Parameter, with_groups
+from glider.tools.own.declare import QUATERNION, Declaration, DeclarationError, Parameter, with_groups
 from glider.tools.own.effects import all_labels, form_errors, labels_of
 
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -186,18 +186,22 @@ def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: P
     states = {one.name: one for one in declared.states}
     outputs = {one.name for one in lists["outputs"]}
     start: dict[str, tuple[float, float]] = {}
+    of_states: dict[str, tuple[float, float]] = {}
     for name, row in given.start.items():
         if name in outputs:
             start[name] = (row.value, row.uncertainty)
         elif name in states:
             states[name] = replace(states[name], start=row.value, start_uncertainty=row.uncertainty)
+            if states[name].kind != QUATERNION:
+                of_states[name] = (row.value, row.uncertainty)
         else:
             raise ConfigError(str(source), "no output or state of the model", key=f"start.{name}",
                               line=locate(text, ["start", name]))  # fmt: skip
     horizon = declared.horizon if given.windows is None else given.windows.seconds
     found = replace(
-        declared, **lists, states=tuple(states.values()), horizon=horizon, start=start, effects=given.effects
-    )
+        declared, **lists, states=tuple(states.values()), horizon=horizon, start=start, start_states=of_states,
+        effects=given.effects,
+    )  # fmt: skip
     try:
         found = with_groups(found, given.groups)
     except DeclarationError as error:

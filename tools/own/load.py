@@ -111,9 +111,9 @@ def _import(wanted: str, folder: Path, wrong: Callable[[str], ConfigError]) -> t
     if ":" not in wanted and not (folder / f"{wanted}.py").is_file():
         found = [one for one in metadata.entry_points(group=ENTRY_POINTS) if one.name == wanted]
         if not found:
-            raise wrong(
-                f"expected module:object, a file.fmu, exec:COMMAND, or a name in {ENTRY_POINTS}; got {wanted!r}"
-            )
+            beside = f"no file {wanted}.py beside it and no such name in {ENTRY_POINTS}"
+            raise wrong(f"{beside if wanted.isidentifier() else f'got {wanted!r}'}: expected module, module:object, "
+                        "a file.fmu, exec:COMMAND, or a name there")  # fmt: skip
         wanted = found[0].value
     module_name, _, attribute = wanted.partition(":")
     file = folder.resolve() / f"{module_name}.py"

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from glider.tools.data.errors import InputError
+from glider.tools.data.runs.columns import TIME
 from glider.tools.own import kernels as names
 from glider.tools.own.compiled import RaisedError
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
@@ -146,10 +147,16 @@ class Observer:
                 value = readings.get(one.name, np.nan)
                 x[k] = value if np.isfinite(value) and one.kind != QUATERNION else x[k]
         if x.shape != (len(declared.states),) or sd.shape != self.scales.shape or not np.isfinite(x).all():
+            blind = [one.column for one in declared.outputs if not np.isfinite(readings[one.name])]
             raise InputError(
                 f"initial: expected {len(declared.states)} finite states (and {len(self.scales)} sigmas), got shape "
-                f"{x.shape}: {np.array2string(x, precision=3, threshold=12)}", source=self.vehicle.source,
-            )  # fmt: skip
+                f"{x.shape}: {np.array2string(x, precision=3, threshold=12)}, of {run.name}"
+                + (f", which has no {', '.join(blind)}{_unread(run, declared)}" if blind else ""),
+                source=self.vehicle.source,
+            )
+        for name, known in declared.start_states.items():
+            k = declared.index("states", name)
+            x[k], sd[k - np.count_nonzero(self.kinds[:k] == QUATERNION_FIRST)] = known
         return self._known(x, np.diag(sd**2), run, point)
 
     def _known(self, x: np.ndarray, P: np.ndarray, run: OwnRun, point: ModelPoint) -> tuple[np.ndarray, np.ndarray]:
@@ -251,7 +258,7 @@ class Observer:
             begins = np.searchsorted(t, horizon * np.arange(count) - 1e-6)
             ends = np.append(begins[1:], np.searchsorted(t, horizon * count + 1e-6))
         starts = np.minimum(np.searchsorted(t, t[begins] + warm - 1e-6), ends - 2)
-        if self.declared.start:
+        if self.declared.start or self.declared.start_states:
             starts[0] = 0
         self._windows[n, horizon] = starts, ends
         return starts, ends
@@ -310,10 +317,12 @@ class Observer:
 
         Rows of warm-ups, and what is left behind the last window, are the model's outputs at the filter's states.
         """
-        by, kernels = self.filter(n, self.point), self.vehicle.kernels
+        by, kernels, run = self.filter(n, self.point), self.vehicle.kernels, self.runs[n]
         out = self.predict(n, self.point, self.horizon, by.states)
         for row in np.flatnonzero(np.isnan(out).all(axis=1)):
-            out[row] = kernels.measure(by.states[row, : len(self.kinds)], self.runs[n].inputs[row], self.point.theta)
+            h = kernels.measure(by.states[row, : len(self.kinds)], run.inputs[row], self.point.theta)
+            gain, bias, drift = self.point.reading[:3]
+            out[row] = gain * h + bias + drift * (run.t[row] - run.t[0])
         return out
 
     def gaps(self, n: int, point: ModelPoint, horizon: float) -> np.ndarray:
@@ -379,6 +388,13 @@ class Observer:
         if self._time_constant is None:
             self._time_constant = float(np.median([time_constant(self, n) for n in range(len(self.runs))]))
         return float(np.clip(TIME_CONSTANTS * self._time_constant, *HORIZON))
+
+
+def _unread(run: OwnRun, declared: Declaration) -> str:
+    """Columns of a run's file that the model has no use for, in brackets."""
+    known = {TIME, *(one.column for one in declared.inputs), *(one.column for one in declared.outputs)}
+    others = [name for name in run.columns if name not in known]
+    return f" (the model knows nothing of {', '.join(others)})" if others else ""
 
 
 def state_kinds(declared: Declaration) -> list[int]:

@@ -12,6 +12,7 @@ from glider.tools.data.errors import InputError
 from glider.tools.data.runs import csvfile
 from glider.tools.data.runs.case import CASE_FILE, run_files
 from glider.tools.data.runs.columns import TIME
+from glider.tools.data.runs.gate import misnamed, wrong_heading
 from glider.tools.data.runs.run import run_name
 from glider.tools.data.sources import read_text
 from glider.tools.own.declare import Declaration
@@ -41,6 +42,7 @@ class OwnRun:
     inputs: np.ndarray  # (rows, inputs)
     outputs: np.ndarray  # (rows, outputs)
     path: Path | None = None
+    columns: tuple[str, ...] = ()  # of its file
 
     def __post_init__(self) -> None:
         for name in ("t", "inputs", "outputs"):  # kernels are compiled for rows that stand one behind the other
@@ -68,7 +70,13 @@ def load_own_runs(folder: Path, declared: Declaration) -> list[OwnRun]:
     if not files or (table.runs is not None and len(files) != table.runs):
         message = f"{table.runs or 'some'} expected, {len(files)} files run*.csv found"
         raise InputError(message, source=folder / CASE_FILE, column="runs")
-    return [load_own_run(path, declared) for path in files]
+    runs = [load_own_run(path, declared) for path in files]
+    known = [one.column for one in declared.outputs]
+    for run in runs:
+        found = misnamed(known, run.columns, [other.columns for other in runs if other is not run])
+        if found is not None:
+            raise InputError(found[1], source=run.path, column=found[0])
+    return runs
 
 
 def load_own_run(path: Path, declared: Declaration) -> OwnRun:
@@ -89,10 +97,14 @@ def load_own_run(path: Path, declared: Declaration) -> OwnRun:
     for n, output in enumerate(declared.outputs):
         if output.column in table.header:
             outputs[:, n] = table.numbers(output.column)
+            read = outputs[np.isfinite(outputs[:, n]), n]
+            reason = wrong_heading(read) if output.angle and len(read) else None
+            if reason is not None:
+                raise table.error(reason, column=output.column)
     if not np.isfinite(outputs).any():
         wanted = ", ".join(one.column for one in declared.outputs)
         raise InputError(f"no column of the model's outputs: {wanted}", source=path)
-    return OwnRun(run_name(path), t, inputs, outputs, path)
+    return OwnRun(run_name(path), t, inputs, outputs, path, tuple(table.header))
 
 
 def _filled(t: np.ndarray, values: np.ndarray, interpolated: bool, table, column: str) -> np.ndarray:

@@ -14,7 +14,8 @@ from glider.tools.own.check import check_model, load_own
 from glider.tools.own.decision import log_odds
 from glider.tools.own.declare import DeclarationError, Output, column_of, declaration, with_groups
 from glider.tools.own.effects import driven_inputs, effects_of, held_inputs, moved, nominal_point, standard_effects
-from glider.tools.own.runs import OwnRun, load_own_run
+from glider.tools.own.runs import OwnRun, load_own_run, load_own_runs
+from glider.tools.own.skeleton import write_skeleton
 
 MODEL = """
 import numpy as np
@@ -179,6 +180,27 @@ def test_missing_samples_of_an_interpolated_input_are_drawn_in_straight(vehicle,
     assert on_the_way[:, 0, 0] == pytest.approx([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.0])
     assert on_the_way[:, 1, 0] == pytest.approx(run.inputs[:, 0])
     assert held_inputs(held, run.inputs)[:, 0, 0] == pytest.approx(run.inputs[:, 0])
+
+
+def test_a_column_of_all_other_runs_and_a_heading_in_degrees_are_named_with_their_file(tmp_path):
+    file = tmp_path / "mine.toml"
+    write_skeleton(file)
+    declared = load_own(file).declared
+    head, rows = (
+        "t_s,thrust_n,rudder_rad,depth_m,yaw_rad,r_rad_s\n",
+        [f"{0.1 * k},1,0,2,{350 + k % 20},0\n" for k in range(40)],
+    )
+    for n in range(3):
+        (tmp_path / f"run{n:02d}.csv").write_text(head + "".join(row.replace(",3", ",0.") for row in rows))
+    load_own_runs(tmp_path, declared)
+    (tmp_path / "run01.csv").write_text(
+        head.replace("depth_m", "Depth") + "".join(row.replace(",3", ",0.") for row in rows)
+    )
+    with pytest.raises(InputError, match=r"run01.csv: depth_m: the other runs have it; here is 'Depth'"):
+        load_own_runs(tmp_path, declared)
+    (tmp_path / "run01.csv").write_text(head + "".join(rows))
+    with pytest.raises(InputError, match=r"run01.csv: yaw_rad: up to 369 rad, not by turning: degrees\?"):
+        load_own_runs(tmp_path, declared)
 
 
 def test_a_model_that_is_nowhere_is_named(tmp_path):

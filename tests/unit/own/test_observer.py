@@ -15,6 +15,7 @@ from glider.tools.own.diagnose import diagnose_own
 from glider.tools.own.effects import driven_inputs, moved, noise_effects, nominal_point, standard_effects
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.skeleton import write_skeleton
 from glider.tools.own.watch import watch
 
 small = st.lists(st.floats(-0.5, 0.5), min_size=5, max_size=5)
@@ -166,6 +167,23 @@ def test_what_is_known_of_a_start_holds_against_a_sensor(tmp_path, linear):
     x, P = observer.start(0, observer.point)
     assert abs(x[0]) < 0.01
     assert np.sqrt(P[0, 0]) == pytest.approx(0.01, rel=0.01)
+
+
+def test_states_known_at_the_start_hold_against_the_models_own_initial_and_what_sensors_read_off_is_predicted(tmp_path):
+    file = tmp_path / "mine.toml"
+    write_skeleton(file)
+    text = file.read_text().replace("[start]", "[start]\nsink_rate = { value = 0.3, uncertainty = 0.01 }")
+    file.write_text(text)
+    t = np.arange(0.0, 30.0, 0.1)
+    y, off_by = np.tile([2.0, 0.1, 0.0], (len(t), 1)), np.array([7.0, 0.0, 0.0])
+    run = OwnRun("run0", t, np.zeros((len(t), 2)), y)
+    x, P = observer_of(load_own(file), [run]).start(0, nominal_point(load_own(file).declared))
+    assert (x[0], x[1]) == (2.0, 0.3)
+    assert np.sqrt(np.diag(P))[:2] == pytest.approx([0.05, 0.01])
+    file.write_text(text.replace("[sensors.depth]", "[sensors.depth]\noffset = 7.0"))
+    off = observer_of(load_own(file), [replace(run, outputs=y + off_by)])
+    file.write_text(text)
+    assert off.predicted(0) == pytest.approx(observer_of(load_own(file), [run]).predicted(0) + off_by)
 
 
 def test_errors_of_an_angle_are_counted_through_turns_where_they_are_fitted(tmp_path, linear):

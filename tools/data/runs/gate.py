@@ -4,7 +4,7 @@ Units, sizes, speeds and times alone; that two readings disagree is for glider.t
 beyond every flight recorded so far (gliders of a pool, a lake and the ocean; a blimp), a wrong unit far beyond them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
@@ -106,12 +106,19 @@ def _wrong(name: str, t: np.ndarray, values: np.ndarray) -> str | None:
 
 def _wrong_angle(name: str, values: np.ndarray, size: float, most: str) -> str | None:
     if name in (names.ATTITUDE[2], names.MOCAP_ATTITUDE[2]):
-        turned = abs(values[0]) < ONE_TURN and np.abs(np.diff(values)).max(initial=0.0) < ONE_TURN
-        return f"up to {most} rad, not by turning: degrees?" if size > LARGEST_YAW and not turned else None
+        return wrong_heading(values)
     if size <= (LARGEST_ROLL if name in (names.ATTITUDE[0], names.MOCAP_ATTITUDE[0]) else LARGEST_PITCH):
         return None
     what = "degrees?" if np.abs(values).max() > ONE_TURN else "no roll or pitch: axes swapped, or degrees?"
     return f"up to {most} rad: {what}"
+
+
+def wrong_heading(values: np.ndarray) -> str | None:
+    """What is wrong with an angle that may turn on and on, rad."""
+    turned = abs(values[0]) < ONE_TURN and np.abs(np.diff(values)).max(initial=0.0) < ONE_TURN
+    if np.quantile(np.abs(values), MOST) <= LARGEST_YAW or turned:
+        return None
+    return f"up to {np.abs(values).max():.4g} rad, not by turning: degrees?"
 
 
 def _wrong_length(name: str, t: np.ndarray, values: np.ndarray) -> str | None:
@@ -138,10 +145,15 @@ def _speed(t: np.ndarray, values: np.ndarray) -> float:
 
 def renamed(run: Run, runs: Sequence[Run]) -> tuple[str, str] | None:
     """A column that all other runs have and this one has not, where it has one that none of them has."""
-    others = [other for other in runs if other is not run]
-    own = {name.lower(): name for name in run.extra if not any(name in other.extra for other in others)}
-    lost = [name for name in names.ALL if name not in run.columns and others]
-    lost = [name for name in lost if all(name in other.columns for other in others)]
+    others = [{*other.columns, *other.extra} for other in runs if other is not run]
+    return misnamed(names.ALL, [*run.columns, *run.extra], others)
+
+
+def misnamed(known: Sequence[str], here: Sequence[str], others: Sequence[Collection[str]]) -> tuple[str, str] | None:
+    """One of the known columns that all other files have and this one has not, where it has one that none of them has;
+    and what to do."""
+    own = {name.lower(): name for name in here if name not in known and not any(name in other for other in others)}
+    lost = [name for name in known if others and name not in here and all(name in other for other in others)]
     if not own or not lost:
         return None
     close = {name: get_close_matches(name, own, 1, 0.0)[0] for name in lost}
