@@ -129,7 +129,7 @@ def test_a_label_in_the_vehicle_file_that_the_model_has_not_is_one_line(pool):
     (folder / "identified" / "named.toml").write_text(text)
     done = glider("gap", "measure", "named", "--vehicle", "identified/named.toml", cwd=folder)
     assert done.returncode == 2
-    assert f"named.toml:{len(text.splitlines())}: effects.r_gin: no label" in done.stderr
+    assert f"named.toml:{len(text.splitlines())}: effects.r_gin: the model has no such label" in done.stderr
 
 
 def test_a_force_that_grows_in_every_run_is_unknown(pool):

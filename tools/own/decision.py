@@ -128,6 +128,10 @@ class Posterior:
     def best(self) -> Hypothesis:
         return self.hypotheses[int(np.argmax(self.weights))]
 
+    def moves(self, one: Hypothesis) -> float:
+        """By how much the label of a hypothesis that does most moves the channels, tolerances."""
+        return float(np.abs(one.sizes * self.reach[self.healthy.at(one.labels)]).max(initial=0.0))
+
 
 def log_odds(effect: Effect) -> float:
     """Log prior odds of a label to one of an input or an output."""

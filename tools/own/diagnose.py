@@ -9,7 +9,7 @@ import numpy as np
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
-from glider.tools.own.decision import NONE, UNKNOWN, Healthy, Hypothesis, Posterior, confounded, group_of
+from glider.tools.own.decision import MATERIAL, NONE, UNKNOWN, Healthy, Hypothesis, Posterior, confounded, group_of
 from glider.tools.own.effects import NOISE, READ_ROWS, UNEXPLAINED, ModelPoint, effects_of
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
@@ -48,18 +48,20 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
     healthy, best = found.healthy, found.best
     effects = {one.label: one for one in healthy.effects}
     verdict, group = verdict_of(found.chances), group_of(found.chances)
-    chosen = _of_verdict(found, verdict)
+    chosen = _of_verdict(found, verdict, group)
     sizes = _sizes(found, effects)
     selected = [
         label for label in chosen.labels
         if effects[label].family not in UNEXPLAINED and _selected(found, label, group)
     ]  # fmt: skip
+    if verdict == "cause" and not selected:
+        selected = group[:1]
     if verdict == NONE:
         selected = []
     causes = [
         {"label": label, "probability": p, "group": group if group[:1] == [label] else [label],
          "parameters": {label: sizes[label]} if label in sizes else {}}
-        for label, p in sorted(found.chances.items(), key=lambda one: -one[1])
+        for label, p in sorted((dict.fromkeys(selected, 0.0) | found.chances).items(), key=lambda one: -one[1])
     ]  # fmt: skip
     gap, corrected = _gaps(observer, healthy, chosen, selected, found)
     where: dict[tuple[str, str], float] = {}
@@ -73,6 +75,9 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
         )
     if verdict == "cause":
         cautions += [*confounded(group, "these runs"), *worse(gap)]
+    if verdict == NONE and best.labels and found.moves(best) < MATERIAL:
+        there = ", ".join(_named(label, sizes[label]) for label in best.labels)
+        cautions.append(f"{there}: it is there, but moves no channel by {MATERIAL:g} tolerances, so it is no gap")
     if vehicle.level and not vehicle.kernels.compiled:
         cautions.append(f"the model runs as {vehicle.kernels.said}")
     return {
@@ -103,11 +108,14 @@ def worse(gap: dict[str, Any]) -> list[str]:
     ]
 
 
-def _of_verdict(found: Posterior, verdict: str) -> Hypothesis:
-    """The most probable hypothesis that the verdict speaks of."""
+def _of_verdict(found: Posterior, verdict: str, group: Sequence[str]) -> Hypothesis:
+    """The most probable hypothesis that the verdict speaks of: of causes, with the most probable one in it."""
     if verdict == NONE:
         return next(one for one in found.hypotheses if not one.labels)
-    return found.best
+    if verdict == UNKNOWN:
+        return found.best
+    weights = dict(zip(map(id, found.hypotheses), found.weights, strict=True))
+    return max((one for one in found.hypotheses if group[0] in one.labels), key=lambda one: weights[id(one)])
 
 
 def _selected(found: Posterior, label: str, group: Sequence[str]) -> bool:
@@ -205,12 +213,17 @@ def sentence(answer: dict[str, Any]) -> str:
         left = answer["gap"]["before"]["total"]
         return f"more is left than healthy runs leave, and no label explains it ({left:.2f} tolerances)"
     cause = next(one for one in answer["causes"] if one["label"] not in (NONE, UNKNOWN))
-    size = cause["parameters"].get(cause["label"])
-    size_text = (
-        ""
-        if size is None
-        else f" {size['estimate']:+.3g} {size['unit']} (90 %: {size['ci90'][0]:.3g} to {size['ci90'][1]:.3g})"
-    )
     others = [label for label in cause["group"] if label != cause["label"]]
     confounded = f"; these runs do not tell it from {', '.join(others)}" if others else ""
-    return f"{cause['label']}{size_text}, probability {cause['probability']:.2f}{confounded}"
+    beside = [_named(one["label"], one["parameters"][one["label"]]) for one in answer["causes"]
+              if one["label"] in answer["selected"] and one["label"] not in cause["group"]]  # fmt: skip
+    text = f"{_named(cause['label'], cause['parameters'].get(cause['label']))}, probability {cause['probability']:.2f}"
+    return text + confounded + (f"; beside it {', '.join(beside)}" if beside else "")
+
+
+def _named(label: str, size: dict[str, Any] | None) -> str:
+    """A label with its size and the interval of that."""
+    if size is None:
+        return label
+    unit = "" if size["unit"] == "1" else f" {size['unit']}"
+    return f"{label} {size['estimate']:+.3g}{unit} (90 %: {size['ci90'][0]:.3g} to {size['ci90'][1]:.3g})"

@@ -6,7 +6,7 @@ the windows' channels, v over a grid of equal chances: labels of all units are a
 labels stand constant forces that no label has. What is concluded from all of them: decision.py.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -259,13 +259,18 @@ class Engine:
         gain[places] = -np.inf
         return [(float(gain[k]), self.healthy.effects[k].label) for k in np.argsort(-gain) if np.isfinite(gain[k])]
 
-    def swaps(self, begin: Hypothesis, tried: Sequence[str]) -> list[tuple[str, Hypothesis]]:
-        """Labels in the place of a hypothesis' last one that come nearest to it where it leads, with their starts."""
+    def swaps(self, begin: Hypothesis, tried: Mapping[tuple[str, ...], Hypothesis]) -> list[tuple[str, Hypothesis]]:
+        """Labels in the place of a hypothesis' last one that come nearest to it where it leads, with their starts; of
+        those that were tried, such as are more probable from here than from where they began."""
         places = self.healthy.at(begin.labels[:-1])
         _, pooled, *_ = self._best_sizes(begin.found, places, begin.shared)
         gain, size = self.label_gains(*alone(pooled))
-        gain[self.healthy.at(tried)] = -np.inf
         (replaced,), starts = self.healthy.at(begin.labels[-1:]), []
+        predicted = begin.evidence + gain - gain[replaced]
+        for labels, known in tried.items():
+            (k,) = self.healthy.at(labels[-1:])
+            if k == replaced or predicted[k] < max(known.evidence + AT_REST, begin.evidence - BEHIND):
+                gain[k] = -np.inf
         for k in np.argsort(-gain)[:BEAM]:
             if not np.isfinite(gain[k]):
                 break
@@ -275,6 +280,26 @@ class Engine:
                 row[replaced] -= begin.shared[replaced]
             starts.append((self.healthy.effects[k].label, replace(begin, shared=shared, own=own, everywhere=False)))
         return starts
+
+    def with_swaps(self, singles: Sequence[Hypothesis], nothing: Hypothesis) -> list[Hypothesis]:
+        """Single labels and those that may stand in the place of the most probable one, until that stays.
+
+        A label may have no size: one that ends far behind `nothing` is lost, and begins there again.
+        """
+        best, led = {one.labels: one for one in sorted(singles, key=lambda one: one.evidence)}, tuple[str, ...]()
+        for _ in range(BEAM):
+            leading = max(best.values(), key=lambda one: one.evidence)
+            if leading.labels == led or leading.evidence <= nothing.evidence:
+                break
+            led = leading.labels
+            best[led] = leading = self.fit(led, leading, every=True)
+            for label, begin in self.swaps(leading, best):
+                one = self.fit((label,), begin)
+                if one.evidence < nothing.evidence - BEHIND:
+                    one = max(one, self.fit((label,), self.bare), key=lambda one: one.evidence)
+                if one.labels not in best or best[one.labels].evidence < one.evidence:
+                    best[one.labels] = one
+        return list(best.values())
 
     def strong_starts(self) -> list[tuple[str, Hypothesis]]:
         """Hypotheses of single labels that begin there."""
@@ -311,13 +336,7 @@ class Engine:
                 best_of = {one.labels: one for one in sorted([*new, *again], key=lambda one: one.evidence)}
                 new = list(best_of.values())
             if depth == 0 and new:
-                leading = max(new, key=lambda one: one.evidence)
-                if leading.evidence > nothing.evidence:
-                    others = [one for one in new if one is not leading]
-                    leading = self.fit(leading.labels, leading, every=True)
-                    new = [*others, leading]
-                    singles = [one.labels[0] for one in new]
-                    new += [self.fit((label,), begin) for label, begin in self.swaps(leading, singles)]
+                new = self.with_swaps(new, nothing)
             best = max(one.evidence for one in every)
             for one in new:
                 one.strange = strangeness(self.healthy, one, nothing)

@@ -276,14 +276,17 @@ def test_a_step_into_a_place_that_is_worse_by_its_own_filter_is_searched_by_that
 
 
 def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():
-    asked, runs = engine(4), [run_at(np.array([1.0, 0.0, 0.0]), alike=0.99) for _ in range(4)]
+    asked, runs = engine(4), [run_at(np.array([1.0, 0.0, 0.0]), alike=0.999) for _ in range(4)]
     shared = np.array([1.0, 0.0, 0.0])
     runs = [replace(one, at=shared, value=0.0, slope=np.zeros(3)) for one in runs]
     leading = Hypothesis(("gain",), 0.0, np.ones(1), np.ones(1), shared, np.tile(shared, (4, 1)), np.ones(4), 0.0, runs)
-    (label, begin), *_ = asked.swaps(leading, ["gain"])
+    (label, begin), *_ = asked.swaps(leading, {("gain",): leading})
     assert label == "mass"
     assert begin.shared == pytest.approx([0.0, 0.99, 0.0], abs=0.02)
-    assert not [label for label, _ in asked.swaps(leading, ["gain", "mass"]) if label in ("gain", "mass")]
+    found = {("gain",): leading, ("mass",): replace(leading, labels=("mass",))}  # as probable as it comes to from there
+    assert not [label for label, _ in asked.swaps(leading, found) if label in ("gain", "mass")]
+    lost = found | {("mass",): replace(leading, labels=("mass",), evidence=-20.0)}
+    assert asked.swaps(leading, lost)[0][0] == "mass"
 
 
 def test_labels_together_count_against_a_force_that_none_has():
