@@ -75,7 +75,7 @@ class ModelPoint:
     density: np.ndarray  # (noises,)
     variance: np.ndarray  # (outputs,) of the sensors
     ports: np.ndarray  # (processes, 4)
-    own: np.ndarray  # (3, parameters of each run): place, 1 sigma, difference step
+    own: np.ndarray  # (3, parameters that the filter estimates along a run): place, 1 sigma, difference step
     driven: dict[int, dict[str, float]] = field(default_factory=dict)  # input: kind: value
 
     def copy(self) -> "ModelPoint":
@@ -114,12 +114,17 @@ def nominal_point(declared: Declaration) -> ModelPoint:
         np.array([one.density for one in declared.noises]),
         np.array([(one.noise or 0.0) ** 2 for one in declared.outputs]),
         np.zeros((0, 4)),
-        np.array(
-            [(n, one.uncertainty, OWN_STEP * one.uncertainty) for n, one in enumerate(declared.parameters)
-             if one.scope == RUN and one.uncertainty > 0.0]
-        ).reshape(-1, 3).T.copy(),
+        np.zeros((3, 0)),
         driven,
-    )  # fmt: skip
+    )
+
+
+def with_run_numbers(declared: Declaration, point: ModelPoint) -> ModelPoint:
+    """A point with whose numbers a single run is flown: those of each run are estimated along it, by the filter. Where
+    several runs are fitted together they are values of the fit instead."""
+    own = [(n, one.uncertainty, OWN_STEP * one.uncertainty) for n, one in enumerate(declared.parameters)
+           if one.scope == RUN and one.uncertainty > 0.0]  # fmt: skip
+    return replace(point, own=np.array(own).reshape(-1, 3).T.copy())
 
 
 def labels_of(declared: Declaration) -> dict[str, tuple[str, str, str]]:

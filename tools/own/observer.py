@@ -18,7 +18,14 @@ from glider.tools.data.runs.columns import TIME
 from glider.tools.own import kernels as names
 from glider.tools.own.compiled import RaisedError
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
-from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs, nominal_point
+from glider.tools.own.effects import (
+    ModelPoint,
+    driven_inputs,
+    forces,
+    held_inputs,
+    nominal_point,
+    with_run_numbers,
+)
 from glider.tools.own.load import LoadedVehicle, called, user_error
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.steps import HORIZON, TIME_CONSTANTS, choose_parts, time_constant
@@ -317,8 +324,9 @@ class Observer:
 
         Rows of warm-ups, and what is left behind the last window, are the model's outputs at the filter's states.
         """
-        by, kernels, run = self.filter(n, self.point), self.vehicle.kernels, self.runs[n]
-        out = self.predict(n, self.point, self.horizon, by.states)
+        point, kernels, run = with_run_numbers(self.declared, self.point), self.vehicle.kernels, self.runs[n]
+        by = self.filter(n, point)
+        out = self.predict(n, point, self.horizon, by.states)
         for row in np.flatnonzero(np.isnan(out).all(axis=1)):
             h = kernels.measure(by.states[row, : len(self.kinds)], run.inputs[row], self.point.theta)
             gain, bias, drift = self.point.reading[:3]
@@ -326,7 +334,9 @@ class Observer:
         return out
 
     def gaps(self, n: int, point: ModelPoint, horizon: float) -> np.ndarray:
-        """Root mean square of measured less predicted, in tolerances, (outputs,); NaN where nothing was recorded."""
+        """Root mean square of measured less predicted, in tolerances, (outputs,), the run's own numbers estimated along
+        it; NaN where nothing was recorded."""
+        point = with_run_numbers(self.declared, point)
         error = self.errors(n, self.predict(n, point, horizon, self.filter(n, point).states), horizon)
         seen = np.isfinite(error).any(axis=0)
         found = np.full(len(self.tolerances), np.nan)
