@@ -78,6 +78,25 @@ def test_identification_finds_the_numbers_and_predicts_runs_left_out_better(pool
         assert low - room < value < high + room, by_name[name]
 
 
+def test_a_number_of_each_run_is_found_run_by_run(pool):
+    folder, case, _ = pool
+    weights = np.array([0.5, 1.1, 0.7, 0.9, 0.4, 1.2])
+    place = [one[0] for one in module_of(folder / "mine_model.py").parameters].index("weight_in_water")
+
+    def with_weight(n, theta):
+        theta[place] = weights[n]
+        return theta
+
+    case("trimmed", 31, runs=len(weights), theta_of=with_weight)
+    text = (folder / "mine.toml").read_text() + '[parameters.weight_in_water]\nscope = "run"\n'
+    (folder / "trimmed.toml").write_text(text)
+    done = glider("identify", "trimmed", "--vehicle", "trimmed.toml", "--out", "by-run", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found = next(one for one in json.loads(done.stdout)["parameters"] if one["name"] == "weight_in_water")
+    off = np.array(found["runs"]) - weights
+    assert off.std() < 0.2 * weights.std()
+
+
 def test_a_healthy_case_is_none(pool):
     folder, case, _ = pool
     case("same", 2)

@@ -41,7 +41,8 @@ def measure(case: Path, report: Path | None, vehicle: str | None, as_json: bool)
     """The gap of CASE per run and channel, and how it is spread over the parts of the model.
 
     Gaps are root mean square errors in tolerances: at 1 the simulator is off by as much as may be. Without --json a
-    report is written too, to <case>-gap.html in the working directory unless --report names a file.
+    report is written too, to <case>-gap.html in the working directory unless --report names a file; of a model of one's
+    own there is none.
     """
     if (theirs := own.own_vehicle(case, vehicle)) is not None:
         own.measure(theirs, case, as_json)
@@ -121,7 +122,7 @@ def diagnose(
     """Where the simulator is wrong about CASE, which effect causes it, and how far the gap shrinks with it.
 
     With --reference the runs are held against healthy ones of the same vehicle, which no model flies exactly: give the
-    vehicle that `glider identify` made of them by --vehicle.
+    vehicle that `glider identify` made of them by --vehicle. A model of one's own needs that vehicle alone.
 
     Several cases, or one with --jobs, --dask or --again, have their answers in folders of DIR that are called as they
     are; those that are answered are kept.

@@ -25,11 +25,13 @@ from glider.tools.data.files import check_writable
 def identify(
     cases: tuple[Path, ...], out: Path | None, seed: int, likelihood: str, vehicle: str | None, as_json: bool
 ) -> None:
-    """Identify the vehicle of CASE from its runs: the twelve coefficients and their distribution, by MCMC.
+    """Identify the vehicle of CASE from its healthy runs: its numbers, and how sure they are.
 
-    Runs that cannot be fitted are named and left out. What is handed out flies runs that its fit has not seen no worse
-    than the file does. With --out: identified.toml (a vehicle file that says where it comes from), report.html,
-    posterior.nc (ArviZ). A model of one's own takes several cases, each a session of its own.
+    What is handed out flies runs that its fit has not seen no worse than the file does. Of ROUGHIE, the twelve
+    coefficients by MCMC; runs that cannot be fitted are named and left out. With --out: identified.toml (a vehicle file
+    that says where it comes from), report.html, posterior.nc (ArviZ).
+
+    A model of one's own takes several cases, each a session of its own; --out has identified.toml and identified.json.
     """
     from glider.tools import api
     from glider.tools.data.runs.case import load_case

@@ -127,9 +127,13 @@ def show(wanted: str, as_json: bool) -> None:
     """A vehicle at a glance: masses, actuators, coefficients and how sure they are."""
     import msgspec
 
-    from glider.tools.data.sources import load_vehicle
+    from glider.tools.data.errors import InputError
+    from glider.tools.data.sources import load_vehicle, read_text
     from glider.tools.inference.model import vehicle_model
+    from glider.tools.own.files import is_own
 
+    if Path(wanted).is_file() and is_own(read_text(Path(wanted))):
+        raise InputError("a model of one's own: `glider vehicle check` shows it", source=wanted)
     loaded = load_vehicle(wanted)
     if as_json:
         print_json(msgspec.to_builtins(loaded))
