@@ -26,6 +26,7 @@ NOT_SI = {
     "deg": "rad", "degree": "rad", "degrees": "rad", "deg/s": "rad/s", "rpm": "rad/s", "cm": "m", "mm": "m", "km": "m",
     "ft": "m", "cm/s": "m/s", "mm/s": "m/s", "kn": "m/s", "g": "kg", "ms": "s", "min": "s", "h": "s", "bar": "Pa",
     "dbar": "Pa", "mbar": "Pa", "hPa": "Pa", "kPa": "Pa", "gf": "N", "kgf": "N", "mV": "V", "mA": "A", "L": "m3",
+    "l": "m3", "ml": "m3", "mL": "m3", "cm3": "m3", "cc": "m3",
 }  # fmt: skip
 # kinds of causes derived from inputs and outputs (effects.py), which no parameter may be named like
 DERIVED = {

@@ -23,6 +23,7 @@ from scipy.special import logsumexp
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.own.declare import Declaration
+from glider.tools.own.effects import with_run_numbers
 from glider.tools.own.excess_noise import SEGMENTS, at_noises, patterns_of
 from glider.tools.own.near import errors_pushed, errors_unsettled
 from glider.tools.own.observer import Observer
@@ -72,12 +73,13 @@ def patterns(observer: Observer, n: int, horizon: float) -> Patterns:
     noises = observer.declared.noises
     starts, ends = observer.windows(n, horizon)
     shapes = patterns_of(observer.runs[n].t, starts, ends)[:SEGMENTS]
-    begun = errors_unsettled(observer, n, horizon)
+    # what a filter along the run would not know of its numbers is not known where a window begins either
+    begun = errors_unsettled(observer.about(with_run_numbers(observer.declared, observer.point)), n, horizon)
     pushed = errors_pushed(observer, n, at_noises(observer.declared, shapes), horizon)
     forced, started = pushed[1:] - pushed[0], begun[1:] - begun[0]
     held = forced.reshape(len(noises), SEGMENTS, *begun.shape[1:]).sum(axis=1) / np.sqrt(SEGMENTS)
     each = [SEGMENTS] * len(noises) + [1] * len(noises) + [len(started)]
-    return Patterns(begun[0], np.concatenate([forced, held, started]), np.append(0, np.cumsum(ends - starts - 1)),
+    return Patterns(pushed[0], np.concatenate([forced, held, started]), np.append(0, np.cumsum(ends - starts - 1)),
                     np.repeat(np.arange(len(each)), each))  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 import msgspec
 import numpy as np
@@ -154,8 +154,16 @@ def _check_rows(text: str, source: str) -> None:
             except msgspec.ValidationError as error:
                 said, _, place = str(error).partition(" - at `$")
                 key = f"{table}.{name}{place.rstrip('`')}"
+                choices = _choices(kind, key.rpartition(".")[2])
+                said += f" (it is {' or '.join(choices)})" if choices else ""
                 line = locate(text, [*key.split(".")])
                 raise ConfigError(source, said[:1].lower() + said[1:], key=key, line=line) from None
+
+
+def _choices(kind: type[Table], name: str) -> list[str]:
+    """Texts that a key of a table may have; none: any."""
+    of = get_args(get_type_hints(kind).get(name))
+    return [word for part in of for word in get_args(part) if isinstance(word, str)]
 
 
 def declared_with(declared: Declaration, given: OwnVehicle, text: str, source: Path) -> Declaration:

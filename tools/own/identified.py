@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.identify import Identified
 from glider.tools.own.measure import gap_row
 from glider.tools.own.model_files import moved_to, write_with_folders
+from glider.tools.own.runs_fit import MIN_SCATTER_RUNS
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
 
@@ -117,6 +119,17 @@ def tables(found: Identified) -> dict[str, Any]:
     return given
 
 
+def _doubtful(found: Identified, rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Parameters whose sign is not the file's, and too few runs to learn how they differ."""
+    known, count = {one.name for one in found.vehicle.declared.parameters}, len(found.observer.runs)
+    turned = [row for row in rows if row["name"] in known and max(row["file"] * end for end in row["ci90"]) < 0.0]
+    said = [f"{row['name']} changes its sign, {row['file']:.4g} to {row['mean']:.4g}: `low` or `high` in the vehicle "
+            "file rules that out" for row in turned]  # fmt: skip
+    if count < MIN_SCATTER_RUNS:
+        said.append(f"how runs differ is assumed, not learned: {MIN_SCATTER_RUNS} runs are needed, got {count}")
+    return said
+
+
 def plain(found: Identified) -> dict[str, Any]:
     """identified.json: numbers with intervals, gaps of runs left out before and after, groups that data do not part."""
     sd = np.sqrt(np.diag(found.covariance))
@@ -141,7 +154,8 @@ def plain(found: Identified) -> dict[str, Any]:
         "gap": {"before": gap_row(names, found.before), "after": gap_row(names, found.after)},
         "horizon_s": found.observer.horizon,
         "channel_ratio": found.channel_ratio, "handed_out": "identified" if found.better else "file",
-        "runs": [run.name for run in found.observer.runs], "notes": [*found.observer.notes, *found.notes, *shown],
+        "runs": [run.name for run in found.observer.runs],
+        "notes": [*found.observer.notes, *found.notes, *shown, *_doubtful(found, rows)],
     }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.data.runs.columns import TIME
+from glider.tools.data.runs.gate import SLOWEST_ROWS
 from glider.tools.own import kernels as names
 from glider.tools.own.compiled import RaisedError
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
@@ -37,6 +38,7 @@ NO_POINT = ModelPoint(
     NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
+WRAP = 1.0  # rad that a jump may be off a turn
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
 MOST_KEPT, MOST_LINEAR = 10_000, 4_000_000  # states that runs begin in; numbers of a run's linear parts
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
@@ -89,8 +91,17 @@ class Observer:
             unknown = self.point.variance == 0.0
             self.point.variance[unknown] = (NOISE_SHARE * self.tolerances[unknown]) ** 2
         self.starts = self.starts or [0] * len(self.runs)
+        self.notes += [f"{one.name} jumps by a turn: an angle that wraps is declared with `angle`"
+                       for n, one in enumerate(declared.outputs) if self._wraps(n)]  # fmt: skip
         self._choose_parts()
         self._choose_starts()
+
+    def _wraps(self, k: int) -> bool:
+        """Whether readings of an output in rad that is no angle jump by nearly a turn."""
+        if self.angles[k] or self.declared.outputs[k].unit != "rad":
+            return False
+        read = [run.outputs[np.isfinite(run.outputs[:, k]), k] for run in self.runs]
+        return any((np.abs(np.abs(np.diff(values)) - 2.0 * np.pi) < WRAP).any() for values in read)
 
     def about(self, point: ModelPoint) -> "Observer":
         """The same observer with another model as its own."""
@@ -226,7 +237,9 @@ class Observer:
             value, squares, samples = np.inf, np.inf, 1
         except RaisedError as raised:
             if not isinstance(raised.error, np.linalg.LinAlgError):
-                raise user_error(raised.error, self.vehicle.source, f"{run.name}") from None
+                apart = float(np.median(np.diff(run.t)))
+                hint = f" (rows {apart:.4g} s apart: is the time's unit right?)" if apart > SLOWEST_ROWS else ""
+                raise user_error(raised.error, self.vehicle.source, run.name + hint) from None
             value, squares, samples = np.inf, np.inf, 1
         along = keep[3] if np.isfinite(value) else NO_LINEAR  # where the filter is lost models near one go on
         return Filtered(float(value), float(squares), int(samples), *keep[:3], along)

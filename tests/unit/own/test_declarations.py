@@ -14,6 +14,7 @@ from glider.tools.own.check import check_model, load_own
 from glider.tools.own.decision import log_odds
 from glider.tools.own.declare import DeclarationError, Output, column_of, declaration, with_groups
 from glider.tools.own.effects import driven_inputs, effects_of, held_inputs, moved, nominal_point, standard_effects
+from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun, load_own_run, load_own_runs
 from glider.tools.own.skeleton import write_skeleton
 
@@ -97,6 +98,10 @@ def test_an_answer_that_depends_on_earlier_calls_is_a_hidden_state(vehicle):
         ("[sensors.depth]\nnoise = -1.0\n", "sensors.depth.noise"),
         ("[start]\ndeep = { value = 0.0, uncertainty = 0.1 }\n", "start.deep: "),
         ("[parameters.drag]\nlow = 9.0\n", "parameters.drag.value: 4 is outside 9 to inf"),
+        (
+            "[parameters.drag]\nscope = 'runs'\n",
+            "parameters.drag.scope: invalid enum value 'runs' (it is vehicle or run)",
+        ),
         ("[groups]\nhull = ['drag', 'drog']\n", "sinker.toml:4: groups.hull: no input, output or parameter"),
         ("[groups]\nhull = ['drag', 'depth']\n", "groups.hull: drag is of the parameters, depth is not"),
         ("[groups]\ndepth = ['drag', 'drag']\n", "groups.depth: a name stands twice"),
@@ -198,6 +203,13 @@ def test_a_column_of_all_other_runs_and_a_heading_in_degrees_are_named_with_thei
     )
     with pytest.raises(InputError, match=r"run01.csv: depth_m: the other runs have it; here is 'Depth'"):
         load_own_runs(tmp_path, declared)
+    turned = "".join(f"{0.1 * k:.1f},1,0,2,{(0.2 * k + 3.0) % 6.2832 - 3.1416:.4f},0\n" for k in range(40))
+    (tmp_path / "run01.csv").write_text(head + turned)
+    assert not observer_of(load_own(file), load_own_runs(tmp_path, declared)).notes
+    model = file.with_name("mine_model.py")
+    model.write_text(model.read_text().replace(', "angle": True', ""))
+    notes = observer_of(load_own(file), load_own_runs(tmp_path, load_own(file).declared)).notes
+    assert notes == ["yaw jumps by a turn: an angle that wraps is declared with `angle`"]
     (tmp_path / "run01.csv").write_text(head + "".join(rows))
     with pytest.raises(InputError, match=r"run01.csv: yaw_rad: up to 369 rad, not by turning: degrees\?"):
         load_own_runs(tmp_path, declared)
