@@ -160,7 +160,7 @@ def _check_rows(text: str, source: str) -> None:
                 raise ConfigError(source, said[:1].lower() + said[1:], key=key, line=line) from None
 
 
-def _choices(kind: type[Table], name: str) -> list[str]:
+def _choices(kind: Any, name: str) -> list[str]:
     """Texts that a key of a table may have; none: any."""
     of = get_args(get_type_hints(kind).get(name))
     return [word for part in of for word in get_args(part) if isinstance(word, str)]
