@@ -128,10 +128,6 @@ class Posterior:
     def best(self) -> Hypothesis:
         return self.hypotheses[int(np.argmax(self.weights))]
 
-    def moves(self, one: Hypothesis) -> float:
-        """By how much the label of a hypothesis that does most moves the channels, tolerances."""
-        return float(np.abs(one.sizes * self.reach[self.healthy.at(one.labels)]).max(initial=0.0))
-
 
 def log_odds(effect: Effect) -> float:
     """Log prior odds of a label to one of an input or an output."""
@@ -239,8 +235,7 @@ def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: i
     weights = strange * np.exp(logs - logsumexp(logs)) + (1.0 - strange) * np.exp(without - logsumexp(without))
     chances: dict[str, float] = {NONE: 0.0, UNKNOWN: 0.0}
     for one, weight in zip(every, weights, strict=True):
-        moves = {label: abs(size) * reach[k] for label, size, k
-                 in zip(one.labels, one.sizes, healthy.at(one.labels), strict=True)}  # fmt: skip
+        moves = moves_of(one, healthy, reach)
         chances[UNKNOWN] += weight * one.strange
         main = max(moves, key=lambda label: moves[label], default=NONE)
         if moves.get(main, 0.0) < MATERIAL:
@@ -249,6 +244,12 @@ def decide(every: list[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: i
             name = UNKNOWN if known[main].family in UNEXPLAINED else main
         chances[name] = chances.get(name, 0.0) + weight * (1.0 - one.strange)
     return Posterior(every, weights, chances, reach, healthy)
+
+
+def moves_of(one: Hypothesis, healthy: Healthy, reach: np.ndarray) -> dict[str, float]:
+    """By how much each label of a hypothesis moves the channels, tolerances; reach (k,): what a spread of each does."""
+    return {label: float(abs(size) * reach[k])
+            for label, size, k in zip(one.labels, one.sizes, healthy.at(one.labels), strict=True)}  # fmt: skip
 
 
 def group_of(chances: Mapping[str, float]) -> list[str]:

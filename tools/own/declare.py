@@ -233,9 +233,7 @@ def declaration(model: Any) -> Declaration:
             if one.name == ALL_INPUTS:
                 raise DeclarationError(f"{what}: {one.name} means all inputs; another name keeps them apart")
             taken[one.name] = what
-    derived = {f"{one.name}_{kind}": one.name for what, kinds in DERIVED.items() for one in lists[what]
-               for kind in kinds}  # fmt: skip
-    derived |= {f"{ALL_INPUTS}_{kind}": "all inputs" for kind in COMMON_KINDS}
+    derived = _derived(lists)
     for one in lists["parameters"]:
         if one.name in derived:
             what = f"{one.name} is what a cause of {derived[one.name]} is called; another name keeps them apart"
@@ -243,12 +241,16 @@ def declaration(model: Any) -> Declaration:
     return Declaration(**lists, horizon=getattr(model, "horizon", None))
 
 
+def _derived(lists: Mapping[str, Sequence[Any]]) -> dict[str, str]:
+    """Label of every cause that is derived from entries of lists, and what it is of."""
+    of = {f"{one.name}_{kind}": one.name for what, kinds in DERIVED.items() for one in lists[what] for kind in kinds}
+    return of | {f"{ALL_INPUTS}_{kind}": "all inputs" for kind in COMMON_KINDS}
+
+
 def with_groups(declared: Declaration, groups: Mapping[str, Sequence[str]]) -> Declaration:
     """A declaration with groups of its inputs, outputs or parameters; DeclarationError where one cannot be."""
     lists = {one.name: what for what in ("inputs", "outputs", "parameters") for one in getattr(declared, what)}
-    taken = {*lists, *(one.name for one in declared.noises), ALL_INPUTS}
-    taken |= {f"{one.name}_{kind}" for what, kinds in DERIVED.items() for one in getattr(declared, what)
-              for kind in kinds}  # fmt: skip
+    taken = {*lists, *(one.name for one in declared.noises), ALL_INPUTS, *_derived(vars(declared))}
     for name, members in groups.items():
         for one in members:
             if one not in lists:

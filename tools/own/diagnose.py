@@ -9,7 +9,17 @@ import numpy as np
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
-from glider.tools.own.decision import MATERIAL, NONE, UNKNOWN, Healthy, Hypothesis, Posterior, confounded, group_of
+from glider.tools.own.decision import (
+    MATERIAL,
+    NONE,
+    UNKNOWN,
+    Healthy,
+    Hypothesis,
+    Posterior,
+    confounded,
+    group_of,
+    moves_of,
+)
 from glider.tools.own.effects import NOISE, READ_ROWS, UNEXPLAINED, ModelPoint, effects_of
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
@@ -75,7 +85,7 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
         )
     if verdict == "cause":
         cautions += [*confounded(group, "these runs"), *worse(gap)]
-    if verdict == NONE and best.labels and found.moves(best) < MATERIAL:
+    if verdict == NONE and best.labels and max(moves_of(best, healthy, found.reach).values()) < MATERIAL:
         there = ", ".join(_named(label, sizes[label]) for label in best.labels)
         cautions.append(f"{there}: it is there, but moves no channel by {MATERIAL:g} tolerances, so it is no gap")
     if vehicle.level and not vehicle.kernels.compiled:
@@ -114,8 +124,8 @@ def _of_verdict(found: Posterior, verdict: str, group: Sequence[str]) -> Hypothe
         return next(one for one in found.hypotheses if not one.labels)
     if verdict == UNKNOWN:
         return found.best
-    weights = dict(zip(map(id, found.hypotheses), found.weights, strict=True))
-    return max((one for one in found.hypotheses if group[0] in one.labels), key=lambda one: weights[id(one)])
+    among = [n for n, one in enumerate(found.hypotheses) if group[0] in one.labels]
+    return found.hypotheses[max(among, key=lambda n: found.weights[n])]
 
 
 def _selected(found: Posterior, label: str, group: Sequence[str]) -> bool:

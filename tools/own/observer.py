@@ -38,7 +38,6 @@ NO_POINT = ModelPoint(
     NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING
 )  # the vehicle file's own is taken
 LOST = 100.0  # tolerances: error of a flight that is lost, and of none more
-WRAP = 1.0  # rad that a jump may be off a turn
 QUATERNION_FIRST, QUATERNION_REST, USUAL_ATTITUDE = 2, 3, 0.1  # kinds of states; rad at the start
 MOST_KEPT, MOST_LINEAR = 10_000, 4_000_000  # states that runs begin in; numbers of a run's linear parts
 NOISE_SHARE = 0.25  # of an output's tolerance: noise where the file gives none
@@ -91,17 +90,17 @@ class Observer:
             unknown = self.point.variance == 0.0
             self.point.variance[unknown] = (NOISE_SHARE * self.tolerances[unknown]) ** 2
         self.starts = self.starts or [0] * len(self.runs)
-        self.notes += [f"{one.name} jumps by a turn: an angle that wraps is declared with `angle`"
+        self.notes += [f"{one.name} jumps by more than half a turn: an angle that wraps is declared with `angle`"
                        for n, one in enumerate(declared.outputs) if self._wraps(n)]  # fmt: skip
         self._choose_parts()
         self._choose_starts()
 
     def _wraps(self, k: int) -> bool:
-        """Whether readings of an output in rad that is no angle jump by nearly a turn."""
+        """Whether readings of an output in rad that is no angle jump by more than half a turn."""
         if self.angles[k] or self.declared.outputs[k].unit != "rad":
             return False
         read = [run.outputs[np.isfinite(run.outputs[:, k]), k] for run in self.runs]
-        return any((np.abs(np.abs(np.diff(values)) - 2.0 * np.pi) < WRAP).any() for values in read)
+        return any((np.abs(np.diff(values)) > np.pi).any() for values in read)
 
     def about(self, point: ModelPoint) -> "Observer":
         """The same observer with another model as its own."""

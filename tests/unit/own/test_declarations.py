@@ -167,7 +167,8 @@ def test_a_group_is_its_members_alike():
     has = effects_of(declared, there)
     assert has == pytest.approx({"x_delay": 0.3, "y_delay": 0.3, "fin_gain": -0.3, "motor_gain": -0.3})
     for wrong, said in (({"hull": ["drag", "trim"]}, "trim is 0"), ({"x": ["fin", "motor"]}, "that nothing else has"),
-                        ({"fin": ["x", "y"]}, "that nothing else has")):  # fmt: skip
+                        ({"fin": ["x", "y"]}, "that nothing else has"),
+                        ({"inputs_lag": ["drag", "lift"]}, "that nothing else has")):  # fmt: skip
         with pytest.raises(DeclarationError, match=said):
             with_groups(declaration(model), wrong)
 
@@ -209,7 +210,7 @@ def test_a_column_of_all_other_runs_and_a_heading_in_degrees_are_named_with_thei
     model = file.with_name("mine_model.py")
     model.write_text(model.read_text().replace(', "angle": True', ""))
     notes = observer_of(load_own(file), load_own_runs(tmp_path, load_own(file).declared)).notes
-    assert notes == ["yaw jumps by a turn: an angle that wraps is declared with `angle`"]
+    assert notes == ["yaw jumps by more than half a turn: an angle that wraps is declared with `angle`"]
     (tmp_path / "run01.csv").write_text(head + "".join(rows))
     with pytest.raises(InputError, match=r"run01.csv: yaw_rad: up to 369 rad, not by turning: degrees\?"):
         load_own_runs(tmp_path, declared)
