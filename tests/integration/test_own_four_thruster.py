@@ -1,5 +1,6 @@
 """The four-thruster AUV of docs/examples: its physics, and, where the recordings are, what is identified from them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from glider.tools.own.observer import Observer
 from glider.tools.own.runs import load_own_runs
 from glider.tools.own.watch import watch
 
-pytestmark = pytest.mark.computes(seconds=120)
+pytestmark = pytest.mark.computes(seconds=150)
 
 ROOT = Path(__file__).resolve().parents[2]
 HAIZHE = ROOT / "docs" / "examples" / "four_thruster_auv" / "haizhe.toml"
@@ -69,6 +70,51 @@ def test_further_dives_of_a_session_are_nothing_new_and_dives_with_a_load_are(id
     begins = [one.first for one in found.events] + [found.names.index(one["from_run"]) for one in found.sessions]
     assert set(begins) == {5}
     assert not (found.strange[:5] > 0.5).any()
+
+
+DAMAGED = 5  # the dive of a watch from which on something is wrong, in the reference's own session
+
+
+def watched(identified, damage):
+    """The one event of a watch of further normal dives, `damage` done to those from DAMAGED on."""
+    model, normal = identified
+    runs = [damage(run) if n >= DAMAGED else run for n, run in enumerate(normal[1::2])]
+    found = watch(model, runs, normal[::2])
+    (event,) = found.plain()["events"]
+    assert found.sessions == []
+    assert event["from_run"] == found.names[DAMAGED]
+    return event
+
+
+def test_a_depth_sensor_that_is_off_is_named_though_sessions_differ_in_its_zero(identified):
+    place = identified[0].declared.index("outputs", "depth")
+
+    def off(run):
+        outputs = run.outputs.copy()
+        outputs[:, place] += 0.1
+        return replace(run, outputs=outputs)
+
+    event = watched(identified, off)
+    assert event["label"] == "depth_bias"
+    assert event["size"] == pytest.approx(0.1, abs=0.03)
+
+
+def test_a_motor_that_gives_less_thrust_is_named(identified):
+    """A propeller of which 0.7 is left, by what the model has it do to a real dive."""
+    model, _ = identified
+
+    def weaker(run):
+        observer = Observer(model, [run])
+        by, whole = observer.filter(0, observer.point), observer.horizon
+        worn = observer.point.copy()
+        worn.driven[3] = {"offset": -32.0}  # us; thrust goes with the square of the speed
+        moved = observer.predict(0, worn, whole, by.states) - observer.predict(0, observer.point, whole, by.states)
+        seen = np.isfinite(moved).all(axis=1)
+        changed = np.array([np.interp(run.t, run.t[seen], column) for column in moved[seen].T]).T
+        return replace(run, outputs=run.outputs + changed)
+
+    event = watched(identified, weaker)
+    assert all(label.startswith("pwm4_") for label in event["group"])
 
 
 def test_dives_that_were_left_out_are_predicted_and_a_load_is_seen_against_the_command(vehicle, identified):

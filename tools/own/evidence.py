@@ -50,3 +50,18 @@ def size_evidence(slope, precision, reach, one_sided) -> np.ndarray:
     gain = 0.5 * (slope**2 * tau2 / total - np.log(total))
     halved = np.log(2.0) + norm.logcdf(slope * np.sqrt(tau2 / total))
     return logsumexp(gain + np.where(one_sided, halved, 0.0), axis=-1) - np.log(len(SIZES))
+
+
+def size_posterior(
+    slope: np.ndarray, precision: np.ndarray, variances: np.ndarray, one_sided: bool
+) -> tuple[float, float, float]:
+    """Log evidence of a label's size over none, its mean and 1 sigma, of the most probable of its priors.
+
+    slope (v,), precision (v, v) of the label and what may stand beside it; variances (priors, v), equally probable.
+    """
+    nat, S = under_priors(slope, precision, variances)
+    mean, sd = S[:, 0] @ slope, np.sqrt(np.maximum(S[:, 0, 0], 1e-30))
+    if one_sided:
+        nat = nat + np.log(2.0) + norm.logcdf(mean / sd)
+    best = int(np.argmax(nat))
+    return float(logsumexp(nat) - np.log(len(nat))), float(mean[best]), float(sd[best])

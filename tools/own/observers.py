@@ -17,16 +17,21 @@ ROUNDING = 0.01  # of that, in the times of rows
 
 def observer_of(vehicle: LoadedVehicle, runs: Sequence[OwnRun], every_row: bool = False) -> Observer:
     """The observer of a vehicle's model over runs: on rows LEAST_STEP apart at least, or on every row."""
-    chosen = list(runs) if every_row else [thinned(run) for run in runs]
+    chosen = (
+        list(runs)
+        if every_row
+        else [thinned(run, [one.interpolated for one in vehicle.declared.inputs]) for run in runs]
+    )
     vehicle = replace(vehicle, declared=with_operating_points(vehicle.declared, chosen))
     return (Observer if vehicle.level else BlackBox)(vehicle, chosen)
 
 
-def thinned(run: OwnRun) -> OwnRun:
+def thinned(run: OwnRun, interpolated: Sequence[bool] = ()) -> OwnRun:
     """A run that was logged faster than its motion needs: of every output a reading each LEAST_STEP, where it was read.
 
     Of rows so close together those are kept that have most outputs, until every output that was read is there: sensors
-    that report on rows of their own all stay, at their times.
+    that report on rows of their own all stay, at their times. An input that is held is the mean of the rows that a row
+    stands for; of one that is interpolated (by input; none is) stays the value at the row.
     """
     interval = max(float(np.median(np.diff(run.t))), 1e-9)
     step = max(1, round(LEAST_STEP / interval))
@@ -41,4 +46,8 @@ def thinned(run: OwnRun) -> OwnRun:
             chosen.append(best)
             missing = missing & ~read[best]
         kept += sorted(chosen) or [int(rows[0])]
-    return replace(run, t=run.t[kept], inputs=run.inputs[kept], outputs=run.outputs[kept])
+    inputs = run.inputs[kept]
+    held = [n for n in range(inputs.shape[1]) if n >= len(interpolated) or not interpolated[n]]
+    rows = np.diff([*kept, len(run.t)])[:, None]
+    inputs[:, held] = np.add.reduceat(run.inputs[:, held], kept, axis=0) / rows
+    return replace(run, t=run.t[kept], inputs=inputs, outputs=run.outputs[kept])

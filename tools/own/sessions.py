@@ -6,7 +6,7 @@ and t_j beside it. Of a label over a span S of a session's runs, all that they s
 are r_S - H_S M r and H_S - H_S M H_S, with H, r the pooled session's and M the covariance that it leaves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,3 +97,15 @@ class SessionRuns:
         apart = x[free] @ np.linalg.solve(self.session.V[np.ix_(free, free)], x[free]) if x.any() else 0.0
         squares = self.pooled.constant - 2.0 * self.pooled.r @ x + x @ self.pooled.H @ x + apart
         return float(-0.5 * squares + size * (r - H @ x)[label] - 0.5 * size**2 * H[label, label])
+
+
+def log_evidence(pooled: Sequence[SessionRuns]) -> float:
+    """Of all sessions' runs, without a label."""
+    return sum(one.pooled.log_evidence() for one in pooled)
+
+
+def summed(parts: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes and precisions of a label in some sessions, together; precisions of single labels not below 0."""
+    slopes, precisions = zip(*parts, strict=True)
+    precision = np.sum(precisions, axis=0)
+    return np.sum(slopes, axis=0), np.maximum(precision, 0.0) if precision.ndim == 1 else precision

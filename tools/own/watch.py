@@ -5,14 +5,13 @@ is shared is learned from the runs of the reference (or the first runs) and the 
 one, the most evident first, each relinearised in the runs of its span, until the next is not probable.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.special import logsumexp
-from scipy.stats import norm
 
 from glider.tools.data.intervals import NINETY
 from glider.tools.own.decision import (
@@ -26,12 +25,12 @@ from glider.tools.own.decision import (
     usual_share,
 )
 from glider.tools.own.effects import FORM, UNEXPLAINED
-from glider.tools.own.evidence import under_priors
+from glider.tools.own.evidence import size_posterior
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
-from glider.tools.own.sessions import Session, SessionRuns, split
+from glider.tools.own.sessions import Session, SessionRuns, log_evidence, split, summed
 from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 from glider.tools.own.watched import CERTAIN, Event, Watched, likeliest
 from glider.tools.own.watched_runs import Warm, WatchedRuns
@@ -60,11 +59,13 @@ class Place:
 
 @dataclass(frozen=True)
 class Refit:
-    """An event where it is most probable, its log odds against what is known, and sessions with it."""
+    """An event where it is most probable, its log odds against what is known, and sessions with it; usual: nat that a
+    deviation of the label as healthy runs have it brings too."""
 
     score: float
     event: Event
     sessions: Sequence[Session]
+    usual: float
 
 
 class Watch(WatchedRuns):
@@ -115,13 +116,35 @@ class Watch(WatchedRuns):
         tried = [split(self.sessions, n, *self.another) for n in range(self.learned, self.count)]
         return [(self.session_gain(self.pooled(one), one), one) for one in tried if len(one) > len(self.sessions)]
 
-    def new_session(self, others: Sequence[tuple[float, Sequence[Session]]]) -> tuple[float, Sequence[Session]]:
-        """The likeliest of further sessions, where it is most probable: its log odds."""
-        if not others:
-            return -np.inf, self.sessions
-        _, further = max(others, key=lambda one: one[0])
-        at = self.led((0, 0), self.expanded(further))
-        return self.session_gain(at.pooled, at.sessions), at.sessions
+    def alone(self, first: int | None) -> tuple[float, Sequence[Session]]:
+        """Log odds of another session from run `first` on (None: of those that are known) by itself, led; sessions."""
+        if first is not None and first not in self.led_alone:
+            further = split(self.sessions, first, *self.another)
+            at = self.led((0, 0), self.expanded(further))
+            self.led_alone[first] = self.session_gain(at.pooled, at.sessions), at.sessions
+        return self.led_alone[first]
+
+    def other_way(self, one: Refit) -> Refit | None:
+        """An event refitted beside a session that begins with it, or without the one that does; None: neither."""
+        first, end = span = one.event.first, one.event.end
+        (k,) = self.healthy.at([one.event.label])
+        if self.begun(one.sessions) is not None:
+            return self.refit(span, k, one.event.size, self.sessions)
+        further = split(self.sessions, first, *self.another)
+        if len(further) == len(self.sessions):
+            return None
+        if end < further[[each.first for each in further].index(first, 1)].end:
+            return None
+        return self.refit(span, k, one.event.size, self.expanded(further))
+
+    def unchanged(self, found: Sequence[Refit]) -> dict[int | None, float]:
+        """Log odds that nothing changed, by the run with which another session begins (None: with none), beside what
+        healthy runs show of one label, as of `with_usual` in decision.py."""
+        best: dict[int | None, float] = {first: gain for first, (gain, _) in self.led_alone.items()}
+        for one in found:
+            first = self.begun(one.sessions)
+            best[first] = max(best[first], self.alone(first)[0] + one.usual)
+        return best
 
     def search(self) -> None:
         """Events and sessions, the most evident first."""
@@ -132,8 +155,11 @@ class Watch(WatchedRuns):
 
         while spans and len(self.events) < MOST_EVENTS:
             self.converge()
+            self.led_alone: dict[int | None, tuple[float, Sequence[Session]]] = {None: (0.0, self.sessions)}
             others = self.others()
-            other, with_other = self.new_session(others)
+            if others:
+                self.alone(self.begun(max(others, key=lambda one: one[0])[1]))
+            other = max(gain for gain, _ in self.led_alone.values())
             # a label alone over every span, and beside another session that begins with it
             tables: list[tuple[Sequence[Session], list[tuple[int, int]], np.ndarray]]
             tables = [(self.sessions, spans, self.scored(spans, self.sessions) + prior(spans, self.sessions))]
@@ -148,24 +174,28 @@ class Watch(WatchedRuns):
                       for _, t, row in (ranked[:SPANS] if any_change else ())]  # fmt: skip
             found = self.compared(places, other)
             total = float(logsumexp([one.score for one in found])) + self.change_odds if found else -np.inf
-            if total > other:
+            other_way = self.other_way(max(found, key=lambda one: one.score)) if found else None
+            unchanged = self.unchanged([*found, other_way] if other_way else found)
+            most = float(logsumexp(list(unchanged.values())))
+            none = unchanged.pop(None)
+            if total > max(unchanged.values(), default=-np.inf):
                 taken, chances = self.decided(found)
                 best = taken.event
-                best.probability = float(1.0 / (1.0 + np.exp(-np.clip(total - np.logaddexp(0.0, other), -50.0, 50.0))))
+                best.probability = float(1.0 / (1.0 + np.exp(-np.clip(total - most, -50.0, 50.0))))
                 best.chances = {label: best.probability * chance for label, chance in chances.items()}
                 reach = self.reach[self.healthy.at([best.label])[0]]
                 if best.probability >= CERTAIN and abs(best.size) * reach >= MATERIAL:
                     self.say(f"{best.label} from {self.name(best.first)} to {self.name(best.end - 1)}: {total:.1f} nat")
                     self.take(taken.sessions, best)
                     continue
-            if other <= 0.0:
+            first = max(unchanged, key=lambda first: unchanged[first], default=None)
+            if first is None or unchanged[first] <= none:
                 break
-            first = self.begun(with_other) or 0
-            self.say(f"another session from {self.name(first)} on: {other:.1f} nat")
-            there = [replace(one, score=one.score + self.change_odds - np.logaddexp.reduce([0.0, other, total]))
+            self.say(f"another session from {self.name(first)} on: {unchanged[first] - none:.1f} nat")
+            there = [replace(one, score=one.score + self.change_odds - np.logaddexp(most, total))
                      for one in found if one.event.first == first]  # fmt: skip
             self.instead[first] = chances_of(there)
-            self.take(with_other)
+            self.take(self.alone(first)[1])
 
     def name(self, n: int) -> str:
         return self.observer.runs[n].name
@@ -174,7 +204,7 @@ class Watch(WatchedRuns):
         """Labels over spans, refitted where each leads.
 
         First those that are best by the parabola about no label. Then, where an event can be more probable than none
-        and than a session alone (log odds `other`), every label that is likely in the best one's place, over each of
+        and than sessions alone (log odds `other`), every label that is likely in the best one's place, over each of
         the spans, until the best one stays.
         """
         found, best = dict[tuple[str, int, int], Refit](), None
@@ -192,7 +222,7 @@ class Watch(WatchedRuns):
                 starts |= dict(strong_sizes(self.observer, self.healthy, self.reach, runs)[:REFITTED])
             add(one, starts)
         while found and (leading := max(found.values(), key=lambda one: one.score)) is not best:
-            if leading.score + np.log(self.named) + self.change_odds < max(0.0, other):
+            if leading.score + np.log(self.named) + self.change_odds < max(leading.usual, other):
                 break
             best, span = leading, (leading.event.first, leading.event.end)
             predicted, size = self.swapped(best)
@@ -245,6 +275,9 @@ class Watch(WatchedRuns):
         def target(pooled: Sequence[SessionRuns], size: float) -> tuple[float, float]:
             return size_posterior(*parabola(pooled, size), effect.one_sided)[1:]
 
+        within, without = span[1] <= sessions[0].end, self.sessions
+        if within:
+            sessions, without = self.with_usual(sessions, k), self.with_usual(without, k)
         at = self.led(span, sessions, k, start, target)
         slope, precision, d = parabola(at.pooled, at.size)
         evidence = log_evidence(at.pooled)
@@ -253,11 +286,12 @@ class Watch(WatchedRuns):
             evidence += float((slope[0] - precision[0, 0] * at.size) * at.size)
             nat, mean, sd = size_posterior(precision[0, :1] * at.size, precision[:1, :1], d[:, :1], effect.one_sided)
         mean = float(np.clip(mean, self.low[k], self.high[k]))
-        usual = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0], self.moved_by_events(span))
         prior = self.span_prior(*span, at.sessions) - np.log(self.named) + log_odds(effect)
-        score = evidence + nat - log_evidence(self.pooled(self.sessions)) - usual + prior
+        gain = evidence + nat - log_evidence(self.pooled(without)) + self.session_prior(at.sessions)
         event = Event({}, *span, effect.label, mean, sd, 0.0)
-        return Refit(score + self.session_prior(at.sessions), event, at.sessions)
+        moved, alone = self.moved_by_events(span), self.alone(self.begun(at.sessions))[0]
+        usual = usual_share(healthy, k, float(self.reach[k]), mean, sd, span[1] - span[0], moved, gain - alone, within)
+        return Refit(gain + prior, event, at.sessions, usual)
 
     def moved_by_events(self, span: tuple[int, int]) -> float:
         """Mean square (tolerances squared) that events move the channels by over a span."""
@@ -302,33 +336,6 @@ def chances_of(found: Sequence[Refit]) -> dict[str, float]:
     for one in found:
         chances[one.event.label] = chances.get(one.event.label, 0.0) + float(np.exp(one.score))
     return chances
-
-
-def log_evidence(pooled: Sequence[SessionRuns]) -> float:
-    """Of all sessions' runs, without a label."""
-    return sum(one.pooled.log_evidence() for one in pooled)
-
-
-def summed(parts: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes and precisions of a label in some sessions, together; precisions of single labels not below 0."""
-    slopes, precisions = zip(*parts, strict=True)
-    precision = np.sum(precisions, axis=0)
-    return np.sum(slopes, axis=0), np.maximum(precision, 0.0) if precision.ndim == 1 else precision
-
-
-def size_posterior(
-    slope: np.ndarray, precision: np.ndarray, variances: np.ndarray, one_sided: bool
-) -> tuple[float, float, float]:
-    """Log evidence of a label's size over none, its mean and 1 sigma, of the most probable of its priors.
-
-    slope (v,), precision (v, v) of the label and what may stand beside it; variances (priors, v), equally probable.
-    """
-    nat, S = under_priors(slope, precision, variances)
-    mean, sd = S[:, 0] @ slope, np.sqrt(np.maximum(S[:, 0, 0], 1e-30))
-    if one_sided:
-        nat = nat + np.log(2.0) + norm.logcdf(mean / sd)
-    best = int(np.argmax(nat))
-    return float(logsumexp(nat) - np.log(len(nat))), float(mean[best]), float(sd[best])
 
 
 def watch(

@@ -156,6 +156,16 @@ class WatchedRuns(Engine):
         warm[n] = found.at, around
         return found
 
+    def with_usual(self, sessions: Sequence[Session], label: int) -> list[Session]:
+        """The same where the reference's has of a label, and of events', what sessions have of it in common, as far as
+        its runs have it."""
+        (first, *others), V, mean = sessions, self.together.V.copy(), np.zeros(self.k)
+        for k in {label, *self.healthy.at([one.label for one in self.events])}:
+            mean[k], more = self.healthy.usual.of_session(k, self.healthy.session_share)
+            V[k, k] += more
+        known = Pooled.of([replace(one, at=one.at - mean) for one in self.runs[: self.learned]], V)
+        return [replace(first, mean=mean + known.mean(), V=known.covariance()), *others]
+
     def pooled(self, sessions: Sequence[Session], runs: dict[int, Expansion] | None = None) -> list[SessionRuns]:
         """Runs by session, what events add taken off; runs: others than those that are known, deviations in them."""
         runs, found = runs or {}, []
@@ -191,9 +201,12 @@ class WatchedRuns(Engine):
         moving = {one.first for one in sessions if one.first == new or max(one.first, span[0]) < min(one.end, span[1])}
         moved = [n for n in range(self.learned, self.count)
                  if span[0] <= n < span[1] or self.session_of(n, sessions).first == new]  # fmt: skip
-        best, warm, kept, at_rest = None, Warm(), dict[int, Expansion](), False
+        begun: Led | None = None
+        best, warm, of_best, kept, at_rest = begun, Warm(), Warm(), dict[int, Expansion](), False
         for round_ in range(LED_ROUNDS):
             if at_rest or round_ == LED_ROUNDS - 1:  # derivatives serve on the way, evidence is taken where they are
+                if best is not None:
+                    sessions, size, warm = best.sessions, best.size, dict(of_best)
                 best, kept = None, {}
             anew = not kept
             if size == 0.0 and new is None:
@@ -208,11 +221,12 @@ class WatchedRuns(Engine):
             density = sum(one.log_density(*span, label, size) for one in pooled)
             gain = np.inf if best is None else density - best.log_density
             if best is not None and gain < -AT_REST:
-                size = 0.5 * (size + best.size)
+                size, warm = 0.5 * (size + best.size), dict(of_best)
                 sessions = [replace(one, values=0.5 * (one.values + other.values)) if one.first in moving else one
                             for one, other in zip(sessions, best.sessions, strict=True)]  # fmt: skip
                 continue
-            best = Led(sessions, pooled, size, density)
+            best, of_best = Led(sessions, pooled, size, density), dict(warm)
+            begun = begun or best
             mean, sd = target(pooled, size)
             most = room(self.reach)[label]
             step = float(np.clip(np.clip(mean, self.low[label], self.high[label]) - size, -most, most))
@@ -224,7 +238,8 @@ class WatchedRuns(Engine):
                 sessions = [replace(one, values=each.given(*span, label, size)) if one.first in moving else one
                             for one, each in zip(sessions, pooled, strict=True)]  # fmt: skip
         assert best is not None
-        return best
+        assert begun is not None
+        return max(best, begun, key=lambda one: one.log_density)
 
     def left(self, n: int) -> float:
         """Mean square that a run leaves about where it was expanded, in units of what healthy runs leave."""

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.special import logsumexp
+from scipy.stats import t as student
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import (
@@ -24,6 +25,7 @@ from glider.tools.own.decision import (
     decide,
     log_prior,
     usual_share,
+    variances_from,
     with_usual,
 )
 from glider.tools.own.diagnose import worse
@@ -168,6 +170,26 @@ def test_what_all_healthy_runs_show_of_a_label_is_no_change_but_the_opposite_is(
     assert least <= usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4) <= most
 
 
+def test_what_sessions_differ_by_is_no_reason_for_a_change_within_one():
+    """Within a session single runs scatter; another one differs as sessions do, and by what all have."""
+    usual = UsualLabels(np.full(3, 0.1), np.full(3, 0.5), np.full(3, 0.3))
+    for within, mean, variances in ((True, 0.0, [0.0025, 0.01]), (False, 0.5, [0.09 + 0.04 + 0.0025])):
+        found = usual.of_runs(0, 4, 4.0, within)
+        assert (found[0], found[1].tolist()) == (mean, pytest.approx(variances))
+    asked = engine(4, usual=usual)
+    within, beyond = (usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, within=one) for one in (True, False))
+    assert within < beyond
+
+
+@pytest.mark.parametrize("runs", [4.0, 30.0])
+def test_a_scatter_known_from_few_runs_may_be_larger(runs):
+    """Student's t, written out."""
+    times, weights = variances_from(runs)
+    for z in (0.5, 3.0, 6.0):
+        density = logsumexp(weights - 0.5 * (z**2 / times + np.log(2.0 * np.pi * times)))
+        assert density == pytest.approx(student.logpdf(z, runs), abs=0.02)
+
+
 def test_of_a_label_that_gains_little_no_more_is_usual():
     asked = engine(4, usual=usually(3.0))
     assert usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, gain=5.0) == pytest.approx(5.0, abs=2.5)
@@ -291,7 +313,7 @@ def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():
 
 def test_labels_together_count_against_a_force_that_none_has():
     asked = Watch(Columns(6), healthy(), 2)
-    events = [Refit(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0), []) for score, label in
+    events = [Refit(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0), [], 0.0) for score, label in
               ((10.0, "force"), (9.5, "gain"), (9.4, "mass"))]  # fmt: skip
     found, chances = asked.decided(events)
     assert (found.event.label, sum(chances.values())) == ("gain", pytest.approx(1.0))
@@ -300,11 +322,20 @@ def test_labels_together_count_against_a_force_that_none_has():
 
 def test_a_label_counts_over_all_spans_in_which_it_may_be():
     asked = Watch(Columns(6), healthy(), 2)
-    events = [Refit(score, Event({}, first, end, label, 1.0, 0.1, 0.0), []) for score, first, end, label in
+    events = [Refit(score, Event({}, first, end, label, 1.0, 0.1, 0.0), [], 0.0) for score, first, end, label in
               ((10.0, 2, 4, "gain"), (9.6, 2, 6, "mass"), (9.8, 3, 6, "mass"))]  # fmt: skip
     found, chances = asked.decided(events)
     assert (found.event.label, found.event.first) == ("mass", 3)
     assert chances["mass"] == pytest.approx(np.exp([9.6, 9.8]).sum() / np.exp([10.0, 9.6, 9.8]).sum())
+
+
+def test_what_healthy_runs_show_of_a_label_counts_for_no_change_and_none_against_the_label():
+    asked = Watch(Columns(6), healthy(), 2)
+    asked.sessions, asked.led_alone = [], {None: (0.0, [])}
+    events = [Refit(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0), [], usual) for score, label, usual in
+              ((10.0, "gain", 8.0), (9.0, "mass", 1.0))]  # fmt: skip
+    assert asked.unchanged(events) == {None: 8.0}
+    assert asked.decided(events)[0].event.label == "gain"
 
 
 def test_that_nothing_changed_has_its_prior_probability():

@@ -1,14 +1,17 @@
 """Sessions: what they differ by is learned number by number; a label is weighed with what they share left open."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from glider.tools.inference.pooled import Parabola, Pooled, Scatter, marginalised
+from glider.tools.own.decision import UsualLabels
+from glider.tools.own.evidence import size_posterior
 from glider.tools.own.identify import USUAL_SESSION_SHARE, learn_sessions
 from glider.tools.own.sessions import Session, SessionRuns, of_another, split
-from glider.tools.own.watch import size_posterior
+from glider.tools.own.watched_runs import WatchedRuns
 
 K = 3
 
@@ -67,6 +70,21 @@ def test_another_session_is_known_by_what_the_reference_says_of_the_vehicle_alon
     gain = joint[K:, :K] @ np.linalg.inv(np.eye(K) + H @ joint[:K, :K])
     assert mean == pytest.approx(gain @ r)
     assert cov == pytest.approx(joint[K:, K:] - gain @ H @ joint[:K, K:])
+
+
+def test_what_the_reference_has_of_a_label_is_known_from_its_runs():
+    random, label = np.random.default_rng(5), 2
+    runs, V = [parabola(random, np.array([0.0, 1.0, 0.4]), 5.0) for _ in range(4)], np.diag([0.5, 0.3, 0.0])
+    usual = UsualLabels(np.full(K, 0.2), np.full(K, 0.1), np.full(K, 0.3))
+    healthy = SimpleNamespace(usual=usual, session_share=4.0, at=lambda labels: [])
+    watched = SimpleNamespace(together=SimpleNamespace(V=V), k=K, healthy=healthy, runs=runs, learned=4, events=[])
+    first, later = WatchedRuns.with_usual(watched, [session(4, 6, random), session(6, 8, random)], label)
+    H, r = sum(one.curvature for one in runs), -sum(one.offset for one in runs)
+    prior = np.linalg.inv(V + np.diag([0.0, 0.0, 0.3**2 + 4.0 * 0.2**2]))
+    np.testing.assert_allclose(first.V, np.linalg.inv(prior + H))
+    assert first.mean == pytest.approx(np.linalg.solve(prior + H, r + prior @ np.array([0.0, 0.0, 0.1])))
+    assert (later.first, later.end) == (6, 8)
+    assert not np.allclose(first.mean[label], 0.1)
 
 
 @pytest.mark.parametrize("span", [(2, 4), (3, 7), (5, 8), (2, 8)])

@@ -35,6 +35,12 @@ def test_sensors_that_report_on_rows_of_their_own_all_stay_at_their_times():
     assert len(found.t) == 400
 
 
+def test_a_held_input_is_the_mean_of_the_rows_that_a_row_stands_for():
+    """A motor that starts between two rows has run half of their time."""
+    run = OwnRun("run", 0.05 * np.arange(8), np.array([[0.0, 0.0]] * 3 + [[1.0, 1.0]] * 5), np.zeros((8, 1)))
+    assert thinned(run, [False, True]).inputs.tolist() == [[0.0, 0.0], [0.5, 0.0], [1.0, 1.0], [1.0, 1.0]]
+
+
 def test_a_log_with_a_row_for_every_message_keeps_its_rate():
     """Four sensors at 10 Hz, a millisecond apart: the usual interval of rows says nothing of how dense they are."""
     t = (0.1 * np.arange(100)[:, None] + 0.001 * np.arange(4)).ravel()
@@ -49,7 +55,7 @@ def test_a_log_with_a_row_for_every_message_keeps_its_rate():
 def test_each_output_that_was_read_in_a_tenth_of_a_second_is_there(read, interval):
     t = interval * np.arange(len(read))
     outputs = np.where(np.array(read), 1.0, NAN)
-    found = thinned(log(t, outputs))
+    found = thinned(log(t, outputs), [True])
     assert np.all(np.diff(found.t) > 0.0)
     assert np.array_equal(found.outputs, outputs[found.inputs[:, 0].astype(int)], equal_nan=True)
     for bin_ in np.unique(np.floor(t / 0.1 + 0.01)):
