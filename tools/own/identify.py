@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import expit, logit
 
 from glider.tools.inference.pooled import (
     Parabola,
@@ -202,7 +203,11 @@ def with_components(
     fit: RunsFit, of: np.ndarray, say: Callable[[str], None]
 ) -> tuple[RunsFit, Components | None, list[str]]:
     """The fit with errors of windows made independent, and what they are made of, where runs say that they are; else
-    the fit itself. A note says how probable that is. of (k,), bool: the values that runs share."""
+    the fit itself. A note says how probable that is. of (k,), bool: the values that runs share.
+
+    Runs say so where what they share differs no more than independent errors have it, and where numbers found so fly
+    runs left out as well: of every channel and run, one normal error whose scale either fit has of its own.
+    """
     observer, declared, count = fit.observer, fit.observer.declared, len(fit.own)
     if not (observer.vehicle.level and declared.noises) or count < MIN_SCATTER_RUNS:
         return fit, None, []
@@ -218,9 +223,14 @@ def with_components(
     ratio = run_inflation(Pooled.of(whitened, tried.V), left_out(whitened, tried.V), of)
     chance = independence(ratio, count)
     say(f"runs left out move the values by {np.sqrt(ratio):.1f} times what independent errors would")
+    if chance > 0.5:
+        tried = tried.led_with_differences(say)
+        before, after = (channel_rms(one.left_out_gaps()) for one in (fit, tried))
+        predicted = count * np.nansum(np.log(np.maximum(before, LEAST_SCALE) / np.maximum(after, LEAST_SCALE)))
+        chance = float(expit(logit(chance) + predicted))
     notes = [f"errors of windows are what the model's noises make: probability {chance:.2f}"]
     say(notes[0])
-    return (tried.led_with_differences(say), learned, notes) if chance > 0.5 else (fit, None, notes)
+    return (tried, learned, notes) if chance > 0.5 else (fit, None, notes)
 
 
 def run_inflation(every: Pooled, others: Sequence[Pooled], free: np.ndarray) -> float:

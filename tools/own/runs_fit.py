@@ -102,6 +102,13 @@ class RunsFit:
             found.append(observer.gaps(n, point, observer.horizon))
         return np.array(found)
 
+    def left_out_gaps(self) -> np.ndarray:
+        """Gaps (runs, outputs), in tolerances, of every run by a model of the others, as this fit has them."""
+        found = self.expansions()
+        eta = float(inflation(found)[-1])
+        warm = [marginalised(one.tempered(eta), self.scatter) for one in found]
+        return self.held_out(Pooled.of(warm, self.V), left_out(warm, self.V))
+
     def stepped(
         self, warm: Sequence[Expansion], found: Sequence[Expansion], level: RunLevel, say: Callable[[str], None]
     ) -> bool:

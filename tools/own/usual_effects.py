@@ -19,7 +19,7 @@ from glider.tools.own.evidence import alone, size_evidence
 from glider.tools.own.hierarchy import LEAST_REACH, RunLevel, expand, inflation
 from glider.tools.own.measure import total_rms
 from glider.tools.own.posterior import MOST_EFFECTS
-from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, SCATTERS, USUAL_OWN_SCATTER, RunsFit, left_out
+from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, SCATTERS, USUAL_OWN_SCATTER, RunsFit
 
 USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads
 MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and how long, before one is chosen
@@ -32,7 +32,7 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
     better is not taken, and is the last.
     """
     added, gone = list[Effect](), set[str]()
-    left = _left(fit) if len(fit.own) >= MIN_SCATTER_RUNS else 0.0
+    left = total_rms(fit.left_out_gaps()) if len(fit.own) >= MIN_SCATTER_RUNS else 0.0
     while left > 0.0:
         odds, eta = _log_odds(fit, added)
         weak = [one for one in added if odds[one] <= 0.0]
@@ -47,21 +47,13 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
         else:
             break
         tried = tried.led_with_differences(say)
-        there = _left(tried)
+        there = total_rms(tried.left_out_gaps())
         have = ", ".join(one.label for one in new) or "none of these"
         say(f"runs left out {left:.2f} -> {there:.2f} tolerances, if all runs have {have}")
         if there >= left:
             break
         fit, added, left = tried, new, there
     return fit, added
-
-
-def _left(fit: RunsFit) -> float:
-    """Gap of runs left out, tolerances."""
-    found = fit.expansions()
-    eta = float(inflation(found)[-1])
-    warm = [marginalised(one.tempered(eta), fit.scatter) for one in found]
-    return total_rms(fit.held_out(Pooled.of(warm, fit.V), left_out(warm, fit.V)))
 
 
 def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float) -> tuple[float, RunsFit, Effect]:
