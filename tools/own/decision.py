@@ -4,7 +4,6 @@ The evidence of a hypothesis is that of its labels (posterior.py). What healthy 
 is no change; and with each hypothesis stands that more is left than healthy runs leave.
 """
 
-import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -39,17 +38,11 @@ class UsualLabels:
     mean: np.ndarray  # of all runs
     error: np.ndarray  # 1 sigma of that
 
-    def of_runs(self, k: int, runs: int, session_share: float, within: bool = False) -> tuple[float, np.ndarray]:
-        """Mean of label k over some runs of a session, and variances of it that are equally probable.
-
-        session_share: `Healthy`'s; within: off that of the session's other runs, off which successive runs are each by
-        itself, or all alike.
-        """
-        each = self.scatter[k] ** 2
-        if within:
-            return 0.0, np.array([each / runs, each])
-        mean, variance = self.of_session(k, session_share)
-        return mean, np.array([variance + each / runs])
+    def of_runs(self, k: int, runs: int, session_share: float, within: bool = False) -> tuple[float, float]:
+        """Mean and variance of label k over some runs of a session; session_share: `Healthy`'s; within: off what the
+        session's other runs have of it."""
+        mean, variance = (0.0, 0.0) if within else self.of_session(k, session_share)
+        return mean, variance + float(self.scatter[k] ** 2) / runs
 
     def of_session(self, k: int, session_share: float) -> tuple[float, float]:
         """Mean and variance of what a session's runs have of label k in common."""
@@ -170,29 +163,17 @@ def usual_share(
     reach: tolerances that a spread of it moves the channels; moved: mean square that those effects move them by;
     within: what other runs of the session have in common of the label is no part of its size.
     """
-    mean, variances = healthy.usual.of_runs(k, runs, healthy.session_share, within)
-    times, weights = variances_from(healthy.runs + HEALTHY.prior_runs)
-    usual = np.outer(variances, times).ravel() + form_variance(healthy, reach, moved)
-    weights = np.tile(weights, len(variances)) - np.log(len(variances))
+    mean, usual = healthy.usual.of_runs(k, runs, healthy.session_share, within)
+    usual += form_variance(healthy, reach, moved)
 
-    def odds(mean: float, scatter: np.ndarray, variance: float) -> float:
+    def odds(mean: float, scatter: float, variance: float) -> float:
         narrow, beyond = scatter + variance, (size - mean) ** 2
-        wide = (SIZES[:, None] / max(reach, LEAST_REACH)) ** 2 + narrow
-        change = logsumexp(weights - 0.5 * (beyond / wide + np.log(wide))) - np.log(len(SIZES))
-        return float(change - logsumexp(weights - 0.5 * (beyond / narrow + np.log(narrow))))
+        wide = (SIZES / max(reach, LEAST_REACH)) ** 2 + narrow
+        change = logsumexp(-0.5 * (beyond / wide + np.log(wide))) - np.log(len(SIZES))
+        return float(change + 0.5 * (beyond / narrow + np.log(narrow)))
 
-    none = np.zeros(len(usual))
-    variance = sd**2 * max(1.0, odds(0.0, none, sd**2) / max(gain, 1e-9))
-    return max(0.0, odds(0.0, none, variance) - odds(mean, usual, variance))
-
-
-@functools.cache
-def variances_from(runs: float) -> tuple[np.ndarray, np.ndarray]:
-    """Values of a variance over the one that was learned from so many runs, and the log probability of each: of a
-    deviation beyond it, Student's t."""
-    log = np.linspace(-3.0, 5.0, 81)
-    weights = -0.5 * runs * (log + np.exp(-log))
-    return np.exp(log), weights - logsumexp(weights)
+    variance = sd**2 * max(1.0, odds(0.0, 0.0, sd**2) / max(gain, 1e-9))
+    return max(0.0, odds(0.0, 0.0, variance) - odds(mean, usual, variance))
 
 
 def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray, runs: int) -> np.ndarray:
