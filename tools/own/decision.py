@@ -64,6 +64,7 @@ class Healthy:
     level_scatter: float  # 1 sigma of the logarithm of a run's mean square left
     noise_gain: Mapping[str, float] = field(default_factory=dict)  # nat a window, of healthy runs; none: not weighed
     run_inflation: float = 1.0  # of the variance of shared values by the likelihood of runs
+    sessions: int = 1  # of these runs
 
     @property
     def session_share(self) -> float:

@@ -75,7 +75,7 @@ def healthy_of(observer: Observer) -> Healthy:
     together = [_correlation(effects, table, one) for one in (table.scatter_correlation, table.session_correlation)]
     runs, sessions = (Scatter(sizes, one) for sizes, one in zip((scatter, session), together, strict=True))
     return Healthy(effects, V, runs, sessions, usual, errors, table.inflation, table.runs, table.level_scatter,
-                   table.noise_gain, table.run_inflation)  # fmt: skip
+                   table.noise_gain, table.run_inflation, table.sessions)  # fmt: skip
 
 
 def _correlation(

@@ -1,8 +1,9 @@
 """Sessions of a watch: successive runs that share what a vehicle is off the identified one by.
 
 Another day's trim, water or battery is no cause (docs/how-to/own-vehicle.md, The method). With x_n = s + t_j + d_n, s ~
-N(0, C) as identified and t_j ~ N(0, diag(session^2)), what is known of a new session is s given the reference's runs,
-and t_j beside it. Of a label over a span S of a session's runs, all that they share integrated out, slope and precision
+N(0, C) as identified and t_j ~ N(0, times^2 T), what is known of a new session is s given the reference's runs, and t_j
+beside it; `times`, how far it differs over what identified sessions do, has the prior that so few of them leave
+(Student's t), and is taken where it is most probable. Of a label over a span S of a session's runs, all that they share integrated out, slope and precision
 are r_S - H_S M r and H_S - H_S M H_S, with H, r the pooled session's and M the covariance that it leaves.
 """
 
@@ -10,9 +11,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import logsumexp
 
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Parabola, Pooled, Scatter, marginalised
 from glider.tools.own.hierarchy import Expansion
+
+TIMES = np.array([1.0, 2.0, 4.0, 8.0])  # that a session differs as far as is known of sessions
 
 
 @dataclass(frozen=True)
@@ -24,28 +29,52 @@ class Session:
     mean: np.ndarray  # (k,) without its own runs
     V: np.ndarray  # (k, k)
     values: np.ndarray  # (k,) about which its runs are expanded
+    times: float = 1.0  # of TIMES
+    log_prior: float = 0.0  # of that
 
 
-def split(sessions: Sequence[Session], first: int, mean: np.ndarray, V: np.ndarray) -> list[Session]:
-    """Sessions with another one from run `first` on, of which (mean, V) is known; themselves where one begins there.
+@dataclass(frozen=True)
+class Another:
+    """What is known of a session that differs `times` as far as is known of sessions: mean (k,), covariance (k, k)."""
+
+    mean: np.ndarray
+    V: np.ndarray
+    times: float
+    log_prior: float
+
+
+def split(sessions: Sequence[Session], first: int, another: Another) -> list[Session]:
+    """Sessions with another one from run `first` on; themselves where one begins there.
 
     The first is the reference's: none of the runs that are watched may be left to it.
     """
     found = list[Session]()
     for one in sessions:
         if one.first <= first < one.end and first not in [other.first for other in sessions[1:]]:
-            found += [replace(one, end=first), Session(first, one.end, mean, V, mean)]
+            known = another.mean, another.V, another.mean, another.times, another.log_prior
+            found += [replace(one, end=first), Session(first, one.end, *known)]
         else:
             found.append(one)
     return found
 
 
-def of_another(runs: Sequence[Parabola], V: np.ndarray, session: Scatter) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and covariance of another session's values: V of the identified vehicle, runs of the reference (tempered,
-    their own deviations integrated out), session: what sessions differ by."""
-    apart = marginalised(Pooled.of(runs, V).parabola(), session)
-    known = Pooled.of([apart], V)
-    return known.mean(), known.covariance() + session.covariance
+def of_another(runs: Sequence[Parabola], V: np.ndarray, session: Scatter, learned_from: int) -> list[Another]:
+    """What is known of another session, however far it differs: V of the identified vehicle, runs of the reference
+    (tempered, their own deviations integrated out), session: what sessions differ by, learned from so many."""
+    together = Pooled.of(runs, V).parabola()
+    found, log_priors = list[Another](), times_log_prior(learned_from)
+    for times, log_prior in zip(TIMES, log_priors, strict=True):
+        scatter = replace(session, sizes=times * session.sizes)
+        known = Pooled.of([marginalised(together, scatter)], V)
+        found.append(Another(known.mean(), known.covariance() + scatter.covariance, float(times), float(log_prior)))
+    return found
+
+
+def times_log_prior(sessions: int) -> np.ndarray:
+    """Log probability of each of TIMES: of a scale learned from so many sessions, what is usual beside them."""
+    known_from = sessions - 1 + HEALTHY.prior_runs
+    found = -known_from * (np.log(TIMES) + 0.5 / TIMES**2)
+    return np.asarray(found - logsumexp(found))
 
 
 @dataclass

@@ -107,20 +107,23 @@ class Watch(WatchedRuns):
         return gain + self.session_prior(sessions)
 
     def session_prior(self, sessions: Sequence[Session]) -> float:
-        """Log prior odds of sessions against those that are known, which run they begin with equally probable."""
+        """Log prior odds of sessions against those that are known, how far they differ; which run they begin with is
+        equally probable."""
         each = np.log(NEW_SESSION / (1.0 - NEW_SESSION) / max(1, self.count - self.learned))
-        return float((len(sessions) - len(self.sessions)) * each)
+        times = sum(one.log_prior for one in sessions) - sum(one.log_prior for one in self.sessions)
+        return float((len(sessions) - len(self.sessions)) * each + times)
 
     def others(self) -> list[tuple[float, Sequence[Session]]]:
         """Sessions with another one from each run on where none begins, and their log odds by the parabola."""
-        tried = [split(self.sessions, n, *self.another) for n in range(self.learned, self.count)]
+        tried = [self.with_another(n) for n in range(self.learned, self.count)]
         return [(self.session_gain(self.pooled(one), one), one) for one in tried if len(one) > len(self.sessions)]
 
     def alone(self, first: int | None) -> tuple[float, Sequence[Session]]:
         """Log odds of another session from run `first` on (None: of those that are known) by itself, led; sessions."""
         if first is not None and first not in self.led_alone:
-            further = split(self.sessions, first, *self.another)
-            at = self.led((0, 0), self.expanded(further))
+            begun = self.with_another(first)
+            led = [self.led((0, 0), one) for one in (begun, self.expanded(begun))]
+            at = max(led, key=lambda one: one.log_density)
             self.led_alone[first] = self.session_gain(at.pooled, at.sessions), at.sessions
         return self.led_alone[first]
 
@@ -130,12 +133,12 @@ class Watch(WatchedRuns):
         (k,) = self.healthy.at([one.event.label])
         if self.begun(one.sessions) is not None:
             return self.refit(span, k, one.event.size, self.sessions)
-        further = split(self.sessions, first, *self.another)
+        further = self.with_another(first)
         if len(further) == len(self.sessions):
             return None
         if end < further[[each.first for each in further].index(first, 1)].end:
             return None
-        return self.refit(span, k, one.event.size, self.expanded(further))
+        return self.refit(span, k, one.event.size, self.alone(first)[1])
 
     def unchanged(self, found: Sequence[Refit]) -> dict[int | None, float]:
         """Log odds that nothing changed, by the run with which another session begins (None: with none), beside what
@@ -170,7 +173,7 @@ class Watch(WatchedRuns):
             ranked = sorted(((float(scores[row].max()), t, row) for t, (_, own, scores) in enumerate(tables)
                              for row in range(len(own))), reverse=True)  # fmt: skip
             any_change = logsumexp(np.concatenate([scores.ravel() for *_, scores in tables])) + self.change_odds > 0.0
-            places = [Place(tables[t][1][row], self.expanded(tables[t][0]), tables[t][2][row])
+            places = [Place(tables[t][1][row], self.alone(self.begun(tables[t][0]))[1], tables[t][2][row])
                       for _, t, row in (ranked[:SPANS] if any_change else ())]  # fmt: skip
             found = self.compared(places, other)
             total = float(logsumexp([one.score for one in found])) + self.change_odds if found else -np.inf

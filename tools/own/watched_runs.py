@@ -16,7 +16,7 @@ from glider.tools.own.hierarchy import Expansion, room, shortened
 from glider.tools.own.observer import Observer
 from glider.tools.own.posterior import AT_REST, Engine
 from glider.tools.own.runs_fit import CONVERGED_GAIN, MIN_SCATTER_RUNS, SCATTER_ROUNDS, LineSearch
-from glider.tools.own.sessions import Session, SessionRuns, of_another
+from glider.tools.own.sessions import Session, SessionRuns, of_another, split
 from glider.tools.own.watched import Event
 
 OWN_ROUNDS, CONVERGED_OWN = 5, 0.1  # of a run's own values, spreads
@@ -73,7 +73,7 @@ class WatchedRuns(Engine):
         known = self.runs[: self.learned]
         M = Pooled.of(known, self.together.V).covariance()
         self.events, self.sessions = list[Event](), [Session(self.learned, self.count, shared, M, shared)]
-        self.another = of_another(known, healthy.V, healthy.session)
+        self.another = of_another(known, healthy.V, healthy.session, healthy.sessions)
         self.instead = dict[int, dict[str, float]]()  # by first run of a session: probabilities of labels in its place
 
     def of_shared(self, found: Sequence[Expansion]) -> list[Expansion]:
@@ -179,6 +179,16 @@ class WatchedRuns(Engine):
         """The run from which on there is another session than those that are known."""
         known = [one.first for one in self.sessions[1:]]
         return next((one.first for one in sessions[1:] if one.first not in known), None)
+
+    def with_another(self, first: int) -> Sequence[Session]:
+        """Sessions with another one from run `first` on, which differs as far as is most probable by the parabola;
+        those that are known where one begins there."""
+        tried = [split(self.sessions, first, one) for one in self.another]
+        if len(tried[0]) == len(self.sessions):
+            return tried[0]
+        new = [next(one for one in reversed(each) if one.first == first) for each in tried]
+        gains = [self.pooled([one])[0].pooled.log_evidence() + one.log_prior for one in new]
+        return tried[int(np.argmax(gains))]
 
     def expanded(self, sessions: Sequence[Session]) -> Sequence[Session]:
         """Sessions, the new one of them about what its runs say of it by the parabola."""

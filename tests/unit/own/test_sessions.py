@@ -10,7 +10,7 @@ from glider.tools.inference.pooled import Parabola, Pooled, Scatter, marginalise
 from glider.tools.own.decision import UsualLabels
 from glider.tools.own.evidence import size_posterior
 from glider.tools.own.identify import USUAL_SESSION_SHARE, learn_sessions
-from glider.tools.own.sessions import Session, SessionRuns, of_another, split
+from glider.tools.own.sessions import TIMES, Another, Session, SessionRuns, of_another, split, times_log_prior
 from glider.tools.own.watched_runs import WatchedRuns
 
 K = 3
@@ -59,17 +59,36 @@ def test_one_session_leaves_what_is_usual():
     assert other.sizes == pytest.approx([1.0, *np.sqrt(USUAL_SESSION_SHARE) * scatter.sizes[1:]])
 
 
-def test_another_session_is_known_by_what_the_reference_says_of_the_vehicle_alone():
+@pytest.mark.parametrize("n", range(len(TIMES)))
+def test_another_session_is_known_by_what_the_reference_says_of_the_vehicle_alone(n):
     random, spread = np.random.default_rng(2), np.array([0.5, 0.0, 3.0])
     runs, V = [parabola(random, np.array([1.0, 1.0, 1.0])) for _ in range(5)], 0.7 * np.eye(K)
-    mean, cov = of_another(runs, V, Scatter(spread))
+    found = of_another(runs, V, Scatter(spread), 2)[n]
     # all of it written out: s and the reference's t, both in every run
     H, r = sum(one.curvature for one in runs), -sum(one.offset for one in runs)
-    T = np.diag(spread**2)
+    T = np.diag((TIMES[n] * spread) ** 2)
     joint = np.block([[V + T, V], [V, V + T]])  # of the reference's values, and another session's
     gain = joint[K:, :K] @ np.linalg.inv(np.eye(K) + H @ joint[:K, :K])
-    assert mean == pytest.approx(gain @ r)
-    assert cov == pytest.approx(joint[K:, K:] - gain @ H @ joint[:K, K:])
+    assert found.mean == pytest.approx(gain @ r)
+    assert found.V == pytest.approx(joint[K:, K:] - gain @ H @ joint[:K, K:])
+    assert (found.times, found.log_prior) == (TIMES[n], times_log_prior(2)[n])
+
+
+def test_how_far_sessions_differ_is_known_the_better_the_more_there_are():
+    one, three, many = (np.exp(times_log_prior(sessions)) for sessions in (1, 3, 30))
+    assert sum(one) == pytest.approx(1.0)
+    assert one[-1] > 3.0 * three[-1] > 0.0
+    assert many[0] > 0.99
+
+
+@pytest.mark.parametrize(("apart", "times"), [(0.1, 1.0), (0.8, 4.0)])
+def test_a_session_far_off_differs_further_than_those_that_are_known(apart, times):
+    random = np.random.default_rng(3)
+    known, new = ([parabola(random, np.full(K, place), 400.0) for _ in range(4)] for place in (0.0, apart))
+    another = of_another(known, 0.01 * np.eye(K), Scatter(np.full(K, 0.2)), 1)
+    watched = SimpleNamespace(sessions=[Session(4, 8, np.zeros(K), 0.01 * np.eye(K), np.zeros(K))], another=another)
+    watched.pooled = lambda sessions: [SessionRuns.of(one, new) for one in sessions]
+    assert WatchedRuns.with_another(watched, 4)[-1].times == times
 
 
 def test_what_the_reference_has_of_a_label_is_known_from_its_runs():
@@ -145,15 +164,16 @@ def test_the_density_at_a_place_is_that_of_the_runs_and_the_prior_there():
 
 def test_a_session_is_split_where_another_begins_and_only_there():
     one = Session(2, 8, np.zeros(K), np.eye(K), np.ones(K))
-    first, second = split([one], 5, np.ones(K), 2.0 * np.eye(K))
+    another = Another(np.ones(K), 2.0 * np.eye(K), 1.0, -0.5)
+    first, second = split([one], 5, another)
     assert (first.first, first.end, second.first, second.end) == (2, 5, 5, 8)
     assert first.values is one.values
     assert second.values == pytest.approx(np.ones(K))
-    assert split([one], 8, np.ones(K), np.eye(K)) == [one]
-    empty, every = split([one], 2, np.ones(K), np.eye(K))  # none of the runs watched is the reference's
+    assert split([one], 8, another) == [one]
+    empty, every = split([one], 2, another)  # none of the runs watched is the reference's
     assert (empty.first, empty.end, every.first, every.end) == (2, 2, 2, 8)
     assert SessionRuns.of(empty, []).pooled.log_evidence() == 0.0
-    assert split([empty, every], 2, np.ones(K), np.eye(K)) == [empty, every]
+    assert split([empty, every], 2, another) == [empty, every]
 
 
 def test_deviations_of_a_session_are_those_of_its_runs_together():
