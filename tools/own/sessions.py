@@ -3,8 +3,9 @@
 Another day's trim, water or battery is no cause (docs/how-to/own-vehicle.md, The method). With x_n = s + t_j + d_n, s ~
 N(0, C) as identified and t_j ~ N(0, times^2 T), what is known of a new session is s given the reference's runs, and t_j
 beside it; `times`, how far it differs over what identified sessions do, has the prior that so few of them leave
-(Student's t), and is taken where it is most probable. Of a label over a span S of a session's runs, all that they share integrated out, slope and precision
-are r_S - H_S M r and H_S - H_S M H_S, with H, r the pooled session's and M the covariance that it leaves.
+(Student's t), and is taken where it is most probable. Of a label over a span S of a session's runs, all that they share
+integrated out, slope and precision are r_S - H_S M r and H_S - H_S M H_S, with H, r the pooled session's and M the
+covariance that it leaves.
 """
 
 from collections.abc import Iterable, Sequence

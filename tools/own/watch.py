@@ -30,7 +30,7 @@ from glider.tools.own.healthy import healthy_of
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
-from glider.tools.own.sessions import Session, SessionRuns, log_evidence, split, summed
+from glider.tools.own.sessions import Session, SessionRuns, log_evidence, summed
 from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 from glider.tools.own.watched import CERTAIN, Event, Watched, likeliest
 from glider.tools.own.watched_runs import Warm, WatchedRuns
