@@ -30,18 +30,16 @@ class Session:
     mean: np.ndarray  # (k,) without its own runs
     V: np.ndarray  # (k, k)
     values: np.ndarray  # (k,) about which its runs are expanded
-    times: float = 1.0  # of TIMES
-    log_prior: float = 0.0  # of that
+    log_prior: float = 0.0  # of how far it differs
 
 
 @dataclass(frozen=True)
 class Another:
-    """What is known of a session that differs `times` as far as is known of sessions: mean (k,), covariance (k, k)."""
+    """What is known of a session that differs one of TIMES as far as is known of sessions."""
 
-    mean: np.ndarray
-    V: np.ndarray
-    times: float
-    log_prior: float
+    mean: np.ndarray  # (k,)
+    V: np.ndarray  # (k, k)
+    log_prior: float  # of these TIMES
 
 
 def split(sessions: Sequence[Session], first: int, another: Another) -> list[Session]:
@@ -52,22 +50,22 @@ def split(sessions: Sequence[Session], first: int, another: Another) -> list[Ses
     found = list[Session]()
     for one in sessions:
         if one.first <= first < one.end and first not in [other.first for other in sessions[1:]]:
-            known = another.mean, another.V, another.mean, another.times, another.log_prior
-            found += [replace(one, end=first), Session(first, one.end, *known)]
+            new = Session(first, one.end, another.mean, another.V, another.mean, another.log_prior)
+            found += [replace(one, end=first), new]
         else:
             found.append(one)
     return found
 
 
 def of_another(runs: Sequence[Parabola], V: np.ndarray, session: Scatter, learned_from: int) -> list[Another]:
-    """What is known of another session, however far it differs: V of the identified vehicle, runs of the reference
+    """What is known of another session, for each of TIMES: V of the identified vehicle, runs of the reference
     (tempered, their own deviations integrated out), session: what sessions differ by, learned from so many."""
     together = Pooled.of(runs, V).parabola()
     found, log_priors = list[Another](), times_log_prior(learned_from)
     for times, log_prior in zip(TIMES, log_priors, strict=True):
         scatter = replace(session, sizes=times * session.sizes)
         known = Pooled.of([marginalised(together, scatter)], V)
-        found.append(Another(known.mean(), known.covariance() + scatter.covariance, float(times), float(log_prior)))
+        found.append(Another(known.mean(), known.covariance() + scatter.covariance, float(log_prior)))
     return found
 
 

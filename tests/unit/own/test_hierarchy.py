@@ -9,11 +9,7 @@ import pytest
 from scipy.special import logsumexp
 
 from glider.tools.inference.hyperparameters import HEALTHY
-from glider.tools.inference.pooled import (
-    Pooled,
-    Scatter,
-    learn_scatter,
-)
+from glider.tools.inference.pooled import Pooled, Scatter, learn_scatter
 from glider.tools.own.decision import (
     FORM_SHARES,
     SIZES,
@@ -100,10 +96,7 @@ def test_a_few_runs_change_little_of_a_scatter_that_many_have_shown():
 
 @pytest.mark.parametrize(("common", "own", "kind"), [(1.5, 0.2, "together"), (0.0, 1.2, "apart")])
 def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
-    random, asked = (
-        np.random.default_rng(5),
-        engine(12, session=by_itself(0.8), scatter=by_itself(0.4)),
-    )
+    random, asked = np.random.default_rng(5), engine(12, session=by_itself(0.8), scatter=by_itself(0.4))
     runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
     by, _, evidence, *_ = asked._best_sizes(runs, [], np.zeros(3))
     assert by.scatter is getattr(asked, kind).scatter
@@ -299,10 +292,13 @@ def test_a_label_that_acts_alike_comes_in_the_place_of_the_best():
     assert asked.swaps(leading, lost)[0][0] == "mass"
 
 
+def refit(score: float, label: str, first: int = 2, end: int = 6, usual: float = 0.0) -> Refit:
+    return Refit(score, Event({}, first, end, label, 1.0, 0.1, 0.0), [], usual)
+
+
 def test_labels_together_count_against_a_force_that_none_has():
     asked = Watch(Columns(6), healthy(), 2)
-    events = [Refit(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0), [], 0.0) for score, label in
-              ((10.0, "force"), (9.5, "gain"), (9.4, "mass"))]  # fmt: skip
+    events = [refit(10.0, "force"), refit(9.5, "gain"), refit(9.4, "mass")]
     found, chances = asked.decided(events)
     assert (found.event.label, sum(chances.values())) == ("gain", pytest.approx(1.0))
     assert asked.decided(events[:2])[0].event.label == "force"
@@ -310,8 +306,7 @@ def test_labels_together_count_against_a_force_that_none_has():
 
 def test_a_label_counts_over_all_spans_in_which_it_may_be():
     asked = Watch(Columns(6), healthy(), 2)
-    events = [Refit(score, Event({}, first, end, label, 1.0, 0.1, 0.0), [], 0.0) for score, first, end, label in
-              ((10.0, 2, 4, "gain"), (9.6, 2, 6, "mass"), (9.8, 3, 6, "mass"))]  # fmt: skip
+    events = [refit(10.0, "gain", 2, 4), refit(9.6, "mass"), refit(9.8, "mass", 3)]
     found, chances = asked.decided(events)
     assert (found.event.label, found.event.first) == ("mass", 3)
     assert chances["mass"] == pytest.approx(np.exp([9.6, 9.8]).sum() / np.exp([10.0, 9.6, 9.8]).sum())
@@ -320,8 +315,7 @@ def test_a_label_counts_over_all_spans_in_which_it_may_be():
 def test_what_healthy_runs_show_of_a_label_counts_for_no_change_and_none_against_the_label():
     asked = Watch(Columns(6), healthy(), 2)
     asked.sessions, asked.led_alone = [], {None: (0.0, [])}
-    events = [Refit(score, Event({}, 2, 6, label, 1.0, 0.1, 0.0), [], usual) for score, label, usual in
-              ((10.0, "gain", 8.0), (9.0, "mass", 1.0))]  # fmt: skip
+    events = [refit(10.0, "gain", usual=8.0), refit(9.0, "mass", usual=1.0)]
     assert asked.unchanged(events) == {None: 8.0}
     assert asked.decided(events)[0].event.label == "gain"
 
@@ -371,18 +365,21 @@ def test_runs_that_differ_by_more_than_they_say_count_for_less(excess):
     assert run_inflation(Pooled.of(runs[:2], V), left_out(runs[:2], V), free) == 1.0
 
 
+def fitted(one: Healthy, sizes: dict[str, float], nat: float, sd: float | list[float] = 0.005) -> Hypothesis:
+    """Labels of sizes, known to sd, that gain nat over none."""
+    return Hypothesis(tuple(sizes), nat + log_prior(one, tuple(sizes)), np.array([*sizes.values()]),
+                      np.broadcast_to(sd, len(sizes)), np.zeros(3), np.zeros((4, 3)), np.ones(4))  # fmt: skip
+
+
 @pytest.mark.parametrize(("gain", "size", "first"), [(2300.0, 3.0, "gain"), (2.0, 0.015, "none")], ids=["far", "usual"])
 def test_a_label_far_from_what_is_usual_is_not_lost_to_another(gain, size, first):
     """0.03 spreads are usual of the first label, known to 0.005; it gains what that says, the second half of it."""
-    one = healthy(usual=usually(0.03))
-
-    def fitted(labels: tuple[str, ...], nat: float, sizes: list[float]) -> Hypothesis:
-        known = np.array(sizes)
-        return Hypothesis(labels, nat + log_prior(one, labels), known, np.full(len(known), 0.005), np.zeros(3),
-                          np.zeros((4, 3)), np.ones(4))  # fmt: skip
-
-    every = [fitted((), 0.0, []), fitted(("gain",), gain, [size]), fitted(("mass",), 0.5 * gain, [size])]
-    every.append(fitted(("gain", "mass"), gain - 4.0, [size, 0.0]))
+    one, known = healthy(usual=usually(0.03)), 0.005
+    every = [fitted(one, {}, 0.0, known), fitted(one, {"gain": size}, gain, known)]
+    every += [
+        fitted(one, {"mass": size}, 0.5 * gain, known),
+        fitted(one, {"gain": size, "mass": 0.0}, gain - 4.0, known),
+    ]
     found = decide(every, one, np.full(3, 1.0 / size), 4)
     assert max(found.chances, key=lambda label: found.chances[label]) == first
 
@@ -391,14 +388,8 @@ def test_a_label_far_from_what_is_usual_is_not_lost_to_another(gain, size, first
 def test_an_effect_stands_beside_another_only_beyond_what_its_form_may_lack(size, beside):
     """Of 5 tolerances, its form 20 % off; another gains 12.5 nat beside it, as 5 sigma do; the odds of one stay."""
     one = healthy()
-
-    def fitted(labels: tuple[str, ...], nat: float, sizes: list[float]) -> Hypothesis:
-        known = np.array(sizes)
-        return Hypothesis(labels, nat + log_prior(one, labels), known, known / 5.0, np.zeros(3),
-                          np.zeros((4, 3)), np.ones(4))  # fmt: skip
-
-    alone = [fitted((), 0.0, []), fitted(("gain",), 2.0, [5.0])]
-    both = decide([*alone, fitted(("gain", "mass"), 14.5, [5.0, size])], one, np.ones(3), 4)
+    alone = [fitted(one, {}, 0.0, []), fitted(one, {"gain": 5.0}, 2.0, [1.0])]
+    both = decide([*alone, fitted(one, {"gain": 5.0, "mass": size}, 14.5, [1.0, size / 5.0])], one, np.ones(3), 4)
     assert (both.weights[2] > 0.5) == beside
     ratio = both.weights[1] / both.weights[0]
     assert ratio == pytest.approx(np.divide(*decide(alone, one, np.ones(3), 4).weights[::-1]))
