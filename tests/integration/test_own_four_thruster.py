@@ -50,6 +50,7 @@ def test_thrust_voltage_and_weight_take_it_down(vehicle):
     assert depth(vehicle, 1198.0, volts=11.9) > usual + 0.05
     lighter = vehicle.declared.parameters[vehicle.declared.index("parameters", "net_buoyancy")].value - 0.05
     assert depth(vehicle, 1198.0, net_buoyancy=lighter) > usual + 0.1
+    assert depth(vehicle, 1198.0, load=0.05) > usual + 0.1
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """A user's model tried before it is used: shapes, numbers, purity, smoothness; errors name the user's file and line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from glider.tools.own.load import LoadedVehicle, called, read_own
 TRIED, SEED, STEP_SECONDS = 4, 20260, 0.05  # states about rest; of their draws; s
 ENERGY_SECONDS, GROWS = 1e-4, 1e-3  # along the motion; of the powers that flow between states
 ENERGY_SCALES, ENERGY_STATES = (0.1, 1.0, 10.0), 40  # times the usual states about rest; states of each
+DEAD_SCALES, DEAD_STATES = (0.1, 1.0, 10.0, 100.0, 1000.0), 20  # of inputs, and to 10 of states about rest; of each
 SMOOTH_STEPS, SMOOTH = (1e-3, 1e-5), 0.3  # of a parameter's uncertainty; by which its two derivatives may differ
 
 
@@ -64,7 +65,7 @@ def check_model(vehicle: LoadedVehicle) -> list[str]:
         if count:
             notes.append(f"{name} has no finite answer at {count} of {len(points)} states tried about rest")
     _pure(vehicle, motion, points)
-    return notes + _not_smooth(vehicle, motion, points[-1]) + _energy_grows(vehicle, motion)
+    return notes + _dead(vehicle, motion) + _not_smooth(vehicle, motion, points[-1]) + _energy_grows(vehicle, motion)
 
 
 def arguments(name: str, point: Trial) -> tuple[Any, ...]:
@@ -132,6 +133,35 @@ def _first_bad(vehicle: LoadedVehicle, name: str, point: Trial) -> str:
     found = np.asarray(called(vehicle, name, *arguments(name, point)), dtype=np.float64)
     names = [one.name for one in (vehicle.declared.outputs if name == "measure" else vehicle.declared.states)]
     return names[int(np.flatnonzero(~np.isfinite(found))[0])]
+
+
+def _dead(vehicle: LoadedVehicle, motion: str) -> list[str]:
+    """Parameters, inputs and noises that change neither motion nor outputs at any of many states and inputs."""
+    declared, alive = vehicle.declared, set[tuple[str, str]]()
+    every = [(where, k, one.name) for where, what in (("theta", "parameters"), ("u", "inputs"), ("w", "noises"))
+             for k, one in enumerate(getattr(declared, what))]  # fmt: skip
+
+    def said(point: Trial) -> list[np.ndarray]:
+        try:
+            with np.errstate(all="ignore"):
+                return [np.asarray(called(vehicle, name, *arguments(name, point))) for name in (motion, "measure")]
+        except InputError:  # beyond what the model is for
+            return []
+
+    points = [replace(one, u=10.0 * times * one.u) for times in DEAD_SCALES
+              for one in trials(vehicle, DEAD_STATES, min(times, 10.0))]  # fmt: skip
+    for point in points:
+        left = [one for one in every if (one[0], one[-1]) not in alive]
+        before = said(point) if left else []
+        for where, k, name in left if before else ():
+            numbers = getattr(point, where).copy()
+            usual = declared.parameters[k].uncertainty if where == "theta" else 0.0
+            numbers[k] += usual or 0.1 * abs(numbers[k]) or 0.1
+            moved = said(replace(point, **{where: numbers}))
+            if not moved or any(not np.array_equal(a, b, equal_nan=True) for a, b in zip(moved, before, strict=True)):
+                alive.add((where, name))
+    return [f"{name} changes nothing at {len(points)} states and inputs tried: is it used?"
+            for where, _, name in every if (where, name) not in alive]  # fmt: skip
 
 
 def _not_smooth(vehicle: LoadedVehicle, motion: str, point: Trial) -> list[str]:

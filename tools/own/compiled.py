@@ -61,11 +61,12 @@ class Kernels:
     measure: Callable[..., Any]
     compiled: bool  # the user's functions, too
     why: str  # they are not: one line
+    at_once: Callable[[int], int] = int  # how many of so many calls run side by side, in threads
 
     @property
     def said(self) -> str:
         """How the user's functions run, in words."""
-        return "compiled by Numba" if self.compiled else f"plain Python, ten to twenty times slower: {self.why}"
+        return "compiled by Numba" if self.compiled else f"plain Python, about ten times slower: {self.why}"
 
 
 def _module(name: str, path: Path, given: dict[str, Any]) -> types.ModuleType:

@@ -19,6 +19,7 @@ from glider.tools.data.sources import read_text
 from glider.tools.own.compiled import Kernels, kernels_of
 from glider.tools.own.declare import QUATERNION, Declaration, DeclarationError, declaration
 from glider.tools.own.files import OwnVehicle, declared_with, decode_own
+from glider.tools.own.kernel_processes import side_by_side
 from glider.tools.own.neighbours import import_file, neighbours
 
 ENTRY_POINTS = "glider.vehicles"
@@ -68,6 +69,8 @@ class LoadedVehicle:
             self._kernels = kernels_of(
                 self.model, self.source, self.attribute, self.zeros(), len(self.declared.outputs)
             )
+            if not self._kernels.compiled:
+                self._kernels = side_by_side(self._kernels, self.path)
         return self._kernels
 
 

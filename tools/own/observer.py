@@ -381,12 +381,11 @@ class Observer:
         return [found[n] for n in range(len(self.runs))]
 
     def each(self, flown: Callable[[Any], Any], over: Iterable[Any]) -> list[Any]:
-        """Flights side by side, on as many threads as there are processors, where they are compiled; one after the
-        other on such a thread."""
-        every, compiled = list(over), bool(self.vehicle.level and self.vehicle.kernels.compiled)
-        threads = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # made at run time
+        """Flights side by side, on as many threads as there are processors; one after the other on such a thread."""
+        every, threads = list(over), numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # made at run time
         alone = threading.current_thread() is threading.main_thread()
-        workers = min(len(every), threads) if compiled and alone else 1
+        workers = min(len(every), threads) if self.vehicle.level and alone else 1
+        workers = self.vehicle.kernels.at_once(workers) if workers > 1 else 1
         if workers < 2:
             return [flown(each) for each in every]
         found, left = [None] * len(every), iter(range(len(every)))

@@ -8,7 +8,7 @@ from glider.tools.data.files import write_files
 MODEL = '''"""A model of one's own: a vehicle that sinks and turns. Put yours here; vectors have the declared order.
 
 Units are SI. Functions are pure: the same answer for the same arguments. Plain numpy and math compile with Numba;
-dictionaries, unpacking of arrays and classes with state do not (it runs all the same, ten to twenty times slower).
+dictionaries, unpacking of arrays and classes with state do not (it runs all the same, about ten times slower).
 """
 
 import math

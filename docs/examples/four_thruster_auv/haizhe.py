@@ -65,6 +65,7 @@ parameters = {
     "yaw_inflow": {"unit": "rad/s", "value": -0.6, "uncertainty": 0.4},
     "yaw_wake": {"unit": "rad/s", "value": -0.6, "uncertainty": 0.4},
     "righting": {"unit": "N m/rad", "value": 0.4, "uncertainty": 0.2, "low": 0.05},
+    "load": {"unit": "kg", "value": 0.0},  # weight that it was not identified with; below the centre, its buoyancy off
 }
 noises = [
     ("heave_force", "m/s2", 0.02), ("roll_moment", "rad/s", 0.05), ("pitch_moment", "rad/s", 0.05),
@@ -104,7 +105,8 @@ def derivative(x, u, w, theta):
     buoyancy = theta[0] * G * math.tanh(depth / theta[1])
     bottom = STIFFNESS * SOFT * math.log1p(math.exp(min((depth - BOTTOM) / SOFT, 30.0)))
     out[0] = heave
-    out[1] = (thrust - buoyancy - bottom - theta[3] * heave - theta[4] * heave * abs(heave)) / theta[2] + w[0]
+    down = thrust + theta[28] * G - buoyancy - bottom
+    out[1] = (down - theta[3] * heave - theta[4] * heave * abs(heave)) / (theta[2] + theta[28]) + w[0]
     out[6] = (running - v) / theta[12]
     out[7] = (v - g) / theta[13]
     level_heel = share * staged(theta[18], theta[19], theta[20], v, g) + ARM * (f2 - f4) / theta[27]

@@ -234,6 +234,15 @@ def test_a_parameter_with_a_threshold_is_noted(vehicle):
     assert any("smooth" in note and "drag" in note for note in check_model(found))
 
 
+@pytest.mark.parametrize(("old", "new", "dead"), [
+    ("u[0] - theta[0] * abs", "u[0] - 4.0 * abs", "drag"), ("u[0] - theta", "- theta", "push"),
+    (" + w[0]", "", "heave"), ("u[0] - theta", "max(u[0] - 300.0, 0.0) - theta", ""), ("", "", ""),
+], ids=["parameter", "input", "noise", "an input with a threshold", "none"])  # fmt: skip
+def test_what_changes_nothing_anywhere_is_noted(vehicle, old, new, dead):
+    notes = [note for note in load_own(vehicle(old, new)).notes if "changes nothing" in note]
+    assert [note.split()[0] for note in notes] == ([dead] if dead else [])
+
+
 ENERGY = """
 
 def energy(x, theta):
