@@ -1,7 +1,6 @@
 """The kernels of a model in plain Python run in other processes (kernel_server.py), as threads wait for each other."""
 
 import contextlib
-import pickle
 import queue
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from glider.tools.own.compiled import NEAR, RUNS, Kernels
+from glider.tools.own.kernel_messages import receive, send
 
 SERVER = "glider.tools.own.kernel_server"
 START_AFTER = 5.0  # s in kernels, from which on it is worth it to start others
@@ -43,7 +43,7 @@ class _Processes:
         def call(*given: Any) -> Any:
             with contextlib.suppress(queue.Empty):
                 one = self.free.get_nowait()
-                with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError):
+                with contextlib.suppress(OSError, EOFError):
                     value, written = _asked(one, name, given)
                     self.free.put(one)
                     if written is not None:
@@ -63,10 +63,9 @@ def _asked(process: "subprocess.Popen[bytes]", name: str, given: tuple[Any, ...]
     """What a kernel returned in a process, and what it wrote into its last argument; None, None: it raised."""
     assert process.stdin is not None
     assert process.stdout is not None
-    pickle.dump((name, given), process.stdin, pickle.HIGHEST_PROTOCOL)
-    process.stdin.flush()
-    answer: tuple[Any, Any] = pickle.load(process.stdout)
-    return answer
+    send(process.stdin, (name, *given))
+    value, written = receive(process.stdout)
+    return value, written
 
 
 def _copy(written: Any, to: Any) -> None:

@@ -1,14 +1,14 @@
 """`python -m glider.tools.own.kernel_server VEHICLE`: kernels of a vehicle file's model for another process.
 
-Calls are pickled on standard input, [name, arguments], answers on standard output, [what it returned, what it wrote
-into its last argument], None twice where it raised; until the input ends.
+Calls are read from standard input, name and arguments (kernel_messages.py), and answered on standard output by what it
+returned and what it wrote into its last argument, None twice where it raised; until the input ends.
 """
 
 import os
-import pickle
 import sys
 from pathlib import Path
 
+from glider.tools.own.kernel_messages import receive, send
 from glider.tools.own.load import read_own
 
 
@@ -19,15 +19,14 @@ def serve(path: Path) -> None:
     kernels = read_own(path).kernels
     while True:
         try:
-            name, given = pickle.load(sys.stdin.buffer)
+            name, *given = receive(sys.stdin.buffer)
         except EOFError:
             return
         try:
             answer = getattr(kernels, name)(*given), given[-1]
         except Exception:  # raised again where it was asked
             answer = None, None
-        pickle.dump(answer, answers, pickle.HIGHEST_PROTOCOL)
-        answers.flush()
+        send(answers, answer)
 
 
 if __name__ == "__main__":
