@@ -21,6 +21,7 @@ from glider.tools.own.decision import (
     moves_of,
 )
 from glider.tools.own.effects import NOISE, READ_ROWS, UNEXPLAINED, ModelPoint, effects_of
+from glider.tools.own.evidence import interval
 from glider.tools.own.healthy import effect_point, healthy_of
 from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
@@ -146,8 +147,8 @@ def _sizes(found: Posterior, effects) -> dict[str, dict[str, Any]]:
         for label, size, sd in zip(one.labels, one.sizes, one.sd, strict=True):
             if label not in sizes:
                 effect = effects[label]
-                ends = [float((size + side * NINETY * sd) * effect.spread) for side in (-1.0, 1.0)]
-                sizes[label] = {"estimate": float(size * effect.spread), "ci90": ends, "unit": effect.unit}
+                sizes[label] = {"estimate": float(size * effect.spread), "ci90": interval(effect, size, sd),
+                                "unit": effect.unit}  # fmt: skip
     return sizes
 
 

@@ -7,8 +7,10 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from glider.tools.data.intervals import NINETY
 from glider.tools.inference.pooled import Pooled
 from glider.tools.own.decision import SIZES, Deviations
+from glider.tools.own.effects import Effect
 from glider.tools.own.hierarchy import Expansion
 
 
@@ -23,6 +25,12 @@ class Place:
     def cost(self, by: Deviations, places: Sequence[int]) -> float:
         """-2 log posterior, sizes of labels at some places left free."""
         return sum(one.value for one in self.found) + by.prior(self.shared, self.own, places)
+
+
+def interval(effect: Effect, size: float, sd: float) -> list[float]:
+    """90 % of a size (spreads) within what the effect can be, in the effect's unit."""
+    ends = np.clip((size - NINETY * sd, size + NINETY * sd), effect.low, effect.high)
+    return [float(end * effect.spread) for end in ends]
 
 
 def alone(pooled: Pooled) -> tuple[np.ndarray, np.ndarray]:

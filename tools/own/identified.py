@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from glider.tools.data.intervals import NINETY
 from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
 from glider.tools.own.effects import FORM, PUSH
+from glider.tools.own.evidence import interval
 from glider.tools.own.identify import Identified
 from glider.tools.own.measure import gap_row
 from glider.tools.own.model_files import moved_to, write_with_folders
@@ -141,7 +141,7 @@ def plain(found: Identified) -> dict[str, Any]:
         if one.family == "parameter":
             start = found.vehicle.declared.parameters[found.vehicle.declared.index("parameters", one.name)].value
         mean, error = start + float(found.values[k] * one.spread), float(sd[k] * one.spread)
-        ends = [mean - NINETY * error, mean + NINETY * error]
+        ends = [start + end for end in interval(one, found.values[k], sd[k])]
         runs = [start + float(row[k] * one.spread) for row in found.run_values]
         rows.append({"name": one.label, "mean": mean, "sd": error, "ci90": ends, "unit": one.unit, "file": start,
                      "runs": runs})  # fmt: skip

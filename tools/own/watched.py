@@ -6,9 +6,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from glider.tools.data.intervals import NINETY
 from glider.tools.own.decision import UNKNOWN, Healthy, confounded, group_of
 from glider.tools.own.effects import UNEXPLAINED
+from glider.tools.own.evidence import interval
 
 CERTAIN = 0.5  # probability from which an event is one
 LEAST_LISTED = 0.005  # probability of a label or a place
@@ -78,7 +78,6 @@ class Watched:
     def _event(self, one: Event, effects) -> dict[str, Any]:
         effect = effects[one.label]
         known = effect.family not in UNEXPLAINED
-        low, high = ((one.size + side * NINETY * one.sd) * effect.spread for side in (-1.0, 1.0))
         # of an unknown change the labels that come nearest
         group = group_of({label: p for label, p in one.chances.items() if effects[label].family not in UNEXPLAINED})
         places: dict[tuple[str, str], float] = {}
@@ -92,5 +91,6 @@ class Watched:
             "from_run": self.names[one.first],
             "to_run": None if one.end == len(self.names) else self.names[one.end - 1],
             "course": "step" if one.end == len(self.names) else "episode",
-            "size": one.size * effect.spread, "ci90": [low, high], "unit": effect.unit, "sizes": [],
+            "size": one.size * effect.spread, "ci90": interval(effect, one.size, one.sd), "unit": effect.unit,
+            "sizes": [],
         }  # fmt: skip
