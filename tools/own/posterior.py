@@ -32,6 +32,7 @@ from glider.tools.own.evidence import Place, alone, size_evidence, under_priors
 from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room, shortened
 from glider.tools.own.observer import Observer
+from glider.tools.own.sessions import TIMES, times_log_prior
 from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 
 NOISES_TRIED = 3  # labels of noises beside a hypothesis
@@ -52,9 +53,13 @@ class Engine:
         self.low = np.array([one.low for one in healthy.effects])
         self.high = np.array([one.high for one in healthy.effects])
         self.active = (np.diag(healthy.V) > 0.0) | (healthy.scatter.sizes > 0.0)
-        # runs of one session, or each of another: which, their evidence says
-        self.together = Deviations(healthy.V + healthy.session.covariance, healthy.scatter)
-        self.apart = Deviations(healthy.V, Scatter.of(healthy.scatter.covariance + healthy.session.covariance))
+        # runs of one session, or each of another, and how far these differ: which, their evidence says
+        self.deviations = list[tuple[Deviations, float]]()
+        for times, prior in zip(TIMES, times_log_prior(healthy.sessions), strict=True):
+            T = replace(healthy.session, sizes=times * healthy.session.sizes).covariance
+            apart = Deviations(healthy.V, Scatter.of(healthy.scatter.covariance + T))
+            self.deviations += [(Deviations(healthy.V + T, healthy.scatter), prior), (apart, prior)]
+        self.together = self.deviations[0][0]
         # constant numbers that a hypothesis may add; noises are weighed beside them (excess_noise.py)
         self.candidate = np.array([one.family not in (FORM, NOISE) and one.odds > 0.0 for one in healthy.effects])
         self.forces = np.array([k for k, one in enumerate(healthy.effects) if one.family == PUSH], dtype=int)
@@ -218,7 +223,7 @@ class Engine:
                  for *sizes, form in grid]  # fmt: skip
         d = np.array(added).reshape(len(grid), len(varied))
         table = []
-        for by in (self.together, self.apart):
+        for by, prior in self.deviations:
             pooled = Pooled.of(by.marginal(found), by.V)
             W = np.linalg.inv(np.eye(self.k) + by.V @ pooled.H)
             M, Q, q = W @ by.V, (pooled.H @ W)[np.ix_(varied, varied)], (W.T @ pooled.r)[varied]
@@ -228,7 +233,7 @@ class Engine:
             variance = np.diag(M)[places] + np.einsum("pa,nab,pb->np", G, S, G)
             sd = np.sqrt(np.maximum(variance, 1e-30))
             halves = (np.log(2.0) + norm.logcdf(mean / sd))[:, sided].sum(axis=1)
-            table.append((pooled.log_evidence() + gained + halves, mean, sd, by, pooled))
+            table.append((prior + pooled.log_evidence() + gained + halves, mean, sd, by, pooled))
         evidence = float(logsumexp([row[0] for row in table]) - np.log(2 * len(grid)))
         nat, mean, sd, by, pooled = max(table, key=lambda row: row[0].max())
         best = int(np.argmax(nat))

@@ -94,14 +94,16 @@ def test_a_few_runs_change_little_of_a_scatter_that_many_have_shown():
     assert known < 0.75 < 1.3 < unknown
 
 
-@pytest.mark.parametrize(("common", "own", "kind"), [(1.5, 0.2, "together"), (0.0, 1.2, "apart")])
-def test_runs_themselves_say_whether_they_are_of_one_session(common, own, kind):
+@pytest.mark.parametrize(("common", "own", "kind", "times"), [(0.8, 0.2, 0, 0), (0.0, 1.2, 1, 0), (6.0, 0.2, 0, 2)])
+def test_runs_themselves_say_whether_they_are_of_one_session_and_how_far_that_differs(common, own, kind, times):
     random, asked = np.random.default_rng(5), engine(12, session=by_itself(0.8), scatter=by_itself(0.4))
     runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
     by, _, evidence, *_ = asked._best_sizes(runs, [], np.zeros(3))
-    assert by.scatter is getattr(asked, kind).scatter
-    each = [Pooled.of(one.marginal(runs), one.V).log_evidence() for one in (asked.together, asked.apart)]
-    assert evidence == pytest.approx(np.logaddexp(*each) - np.log(2.0))
+    best, _ = asked.deviations[2 * times + kind]
+    assert by.scatter is best.scatter
+    assert np.array_equal(by.V, best.V)
+    each = [prior + Pooled.of(one.marginal(runs), one.V).log_evidence() for one, prior in asked.deviations]
+    assert evidence == pytest.approx(logsumexp(each) - np.log(2.0))
 
 
 def test_deviations_alike_in_all_runs_have_the_prior_of_their_two_levels():
@@ -118,16 +120,16 @@ def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
     runs, shared = [run_at(random.normal(size=3), 0.3) for _ in range(4)], random.normal(size=3)
     by, at, evidence, mean, sd = asked._best_sizes(runs, places, shared)
     nat = []
-    for each in (asked.together, asked.apart):
+    for each, prior in asked.deviations:
         for *sizes, form in itertools.product(*[SIZES.tolist()] * len(places), FORM_SHARES):
             pooled = Pooled.of(each.marginal(runs), asked.variance(each.V, places, sizes, shared, form))
-            nat.append(pooled.log_evidence())
-    assert evidence == pytest.approx(logsumexp(nat) - np.log(len(nat)))
-    assert at.log_evidence() == pytest.approx(max(nat))
+            nat.append(prior + pooled.log_evidence())
+    assert evidence == pytest.approx(logsumexp(nat) - np.log(2 * len(SIZES) ** len(places) * len(FORM_SHARES)))
+    assert at.log_evidence() + max(prior for _, prior in asked.deviations) == pytest.approx(max(nat))
     assert mean == pytest.approx(at.mean()[places])
     assert sd**2 == pytest.approx(np.diag(at.covariance())[places])
     # what it is led by: the most probable sizes of labels that are as they have it
-    each = next(one for one in (asked.together, asked.apart) if one.scatter is by.scatter)
+    each, _ = next(one for one in asked.deviations if one[0].scatter is by.scatter)
     plain = [asked.variance(each.V, places, sizes, shared, 0.0)
              for sizes in itertools.product(*[SIZES.tolist()] * len(places))]  # fmt: skip
     pooled = Pooled.of(each.marginal(runs), each.V)
@@ -248,7 +250,7 @@ def test_a_fit_ends_where_its_posterior_rests():
     assert again.evidence == pytest.approx(found.evidence, abs=1e-6)
     by, *_ = asked._best_sizes(found.found, [0], found.shared)
     assert found.shared[2] == pytest.approx(Pooled.of(by.marginal(found.found), by.V).mean()[2])
-    assert np.diag(by.V)[2] in np.diag(asked.together.V) + np.diag(asked.apart.V)
+    assert np.diag(by.V)[2] in np.diag(asked.deviations[0][0].V) + np.diag(asked.deviations[1][0].V)
 
 
 def test_a_way_that_ends_worse_by_the_filter_there_is_taken_back():
