@@ -124,6 +124,7 @@ def test_a_rudder_that_turns_less_is_its_gain(pool):
     first = answer["causes"][0]
     assert answer["verdict"] == "cause"
     assert {"rudder_gain", "turn_rate_per_rudder"} & set(first["group"])
+    assert any("from one session" in line for line in answer["cautions"])
     assert len(first["group"]) <= 3
     assert answer["gap"]["after"]["total"] < 0.6 * answer["gap"]["before"]["total"]
 
@@ -333,6 +334,7 @@ def days(pool):
         case(f"day{day}", 20 + day, runs=3, read=lambda n, y, bias=bias: y + np.array([0.0, 0.0, bias]))
     done = glider("identify", *(f"day{n}" for n in range(5)), "--vehicle", "gyro.toml", "--out", "days", cwd=folder)
     assert done.returncode == 0, done.stderr
+    assert "one session" not in (folder / "days" / "identified.json").read_text()
     return folder, case
 
 

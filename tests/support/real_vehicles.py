@@ -107,17 +107,17 @@ def blimp(data: Path, out: Path) -> None:
 
 def auv(data: Path, out: Path) -> None:
     """The AUV: each normal session's other dives, with their depth read off from one on, and before dives with a load
-    or a damaged propeller of other sessions."""
+    or a damaged propeller of other sessions; with a load, too, by a vehicle identified from that session alone."""
     sessions = {name: recorded(data / f"normal_{name}") for name in "abc"}
     for name, runs in sessions.items():
         copied(out / f"reference-{name}", runs[::2])
     healthy = [f"reference-{name}" for name in sessions]
     asked(out, "identify", "identify", *healthy, "--vehicle", AUV, "--out", "identified")
 
-    def ask(case: str, after: str, first: int) -> None:
-        answer = asked(out, f"said-{case}", "gap", "watch", case, "--reference", f"reference-{after}",
-                       "--vehicle", "identified/identified.toml")  # fmt: skip
-        print(f"{case}, from run {first} on:", said(answer), flush=True)
+    def ask(case: str, after: str, first: int, by: str = "identified") -> None:
+        answer = asked(out, f"said-{case}-{by}", "gap", "watch", case, "--reference", f"reference-{after}",
+                       "--vehicle", f"{by}/identified.toml")  # fmt: skip
+        print(f"{case}, from run {first} on, {by}:", said(answer), flush=True)
 
     for name, runs in sessions.items():
         copied(out / f"{name}-depth", runs[1::2], "depth_m", lambda value: value + OFF_M, READ_OFF)
@@ -128,6 +128,9 @@ def auv(data: Path, out: Path) -> None:
             case = f"{name}-{after}"
             copied(out / case, [*runs[1::2], *further[:LOADED]])
             ask(case, name, len(runs[1::2]))
+    for name, runs in sessions.items():
+        asked(out, f"identify-{name}", "identify", f"reference-{name}", "--vehicle", AUV, "--out", f"alone-{name}")
+        ask(f"{name}-load", name, len(runs[1::2]), f"alone-{name}")
 
 
 def main() -> None:

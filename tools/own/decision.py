@@ -275,3 +275,11 @@ def group_of(chances: Mapping[str, float]) -> list[str]:
 def confounded(group: Sequence[str], what: str) -> list[str]:
     """A caution, where more labels than are an answer explain what is named."""
     return [f"{len(group)} labels explain {what} confounded: {', '.join(group)}"] if len(group) > MOST_GROUP else []
+
+
+def from_one_session(sessions: int) -> list[str]:
+    """A caution, where it is not known what sessions differ by."""
+    said = (
+        "identified from one session: what days differ by is assumed, and may be called a cause; identify from several"
+    )
+    return [f"{said}, or watch with healthy runs of the same day as reference"] if sessions == 1 else []

@@ -17,6 +17,7 @@ from glider.tools.own.decision import (
     Hypothesis,
     Posterior,
     confounded,
+    from_one_session,
     group_of,
     moves_of,
 )
@@ -85,7 +86,8 @@ def plain(vehicle: LoadedVehicle, observer: Observer, found: Posterior, case: st
             "the vehicle file is not identified: `glider identify` on healthy runs says what it leaves of them"
         )
     if verdict == "cause":
-        cautions += [*confounded(group, "these runs"), *worse(gap)]
+        known = [] if vehicle.file.identified is None else from_one_session(healthy.sessions)
+        cautions += [*confounded(group, "these runs"), *worse(gap), *known]
     if verdict == NONE and best.labels and max(moves_of(best, healthy, found.reach).values()) < MATERIAL:
         there = ", ".join(_named(label, sizes[label]) for label in best.labels)
         cautions.append(f"{there}: it is there, but moves no channel by {MATERIAL:g} tolerances, so it is no gap")

@@ -10,6 +10,7 @@ import numpy as np
 
 from glider.tools.data.plain import as_plain
 from glider.tools.data.version import software
+from glider.tools.own.decision import from_one_session
 from glider.tools.own.effects import FORM, PUSH
 from glider.tools.own.evidence import interval
 from glider.tools.own.identify import Identified
@@ -155,7 +156,9 @@ def plain(found: Identified) -> dict[str, Any]:
         "horizon_s": found.observer.horizon,
         "channel_ratio": found.channel_ratio, "handed_out": "identified" if found.better else "file",
         "runs": [run.name for run in found.observer.runs],
-        "notes": [*found.observer.notes, *found.notes, *shown, *_doubtful(found, rows)],
+        "notes": [
+            *found.observer.notes, *found.notes, *shown, *_doubtful(found, rows), *from_one_session(found.sessions),
+        ],
     }  # fmt: skip
 
 
