@@ -16,11 +16,13 @@ from typing import Any
 import numpy as np
 
 from glider.tools.own.decision import NONE, Posterior
-from glider.tools.own.effects import Effect, driven_inputs, moved, nominal_point, standard_effects
+from glider.tools.own.driven import driven_inputs
+from glider.tools.own.effects import Effect, moved, nominal_point, standard_effects
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identify import identify
 from glider.tools.own.load import LoadedVehicle, read_own
+from glider.tools.own.noise_hypotheses import posterior_of
 from glider.tools.own.observer import Observer
 from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
@@ -82,7 +84,7 @@ def identified(vehicle: LoadedVehicle, seed: int, folder: Path, runs: int = 6) -
 def diagnosed(vehicle: LoadedVehicle, runs: list[OwnRun]) -> Posterior:
     """What a case of runs has."""
     observer = Observer(vehicle, runs)
-    return Engine(observer, healthy_of(observer)).run()
+    return posterior_of(Engine(observer, healthy_of(observer)))
 
 
 def size_of(answer: Posterior, label: str) -> tuple[float, float]:

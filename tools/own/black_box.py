@@ -6,7 +6,8 @@ import numpy as np
 
 from glider.tools.data.errors import InputError
 from glider.tools.own import kernels as names
-from glider.tools.own.effects import ModelPoint, driven_inputs
+from glider.tools.own.driven import driven_inputs
+from glider.tools.own.effects import ModelPoint
 from glider.tools.own.load import called
 from glider.tools.own.observer import NO_LINEAR, WARM_UP, WARM_UP_SHARE, Filtered, Observer
 from glider.tools.own.runs import OwnRun

@@ -28,6 +28,7 @@ from glider.tools.own.identified import toml_text
 from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.measure import gap_row
 from glider.tools.own.model_files import moved_to, write_with_folders
+from glider.tools.own.noise_hypotheses import posterior_of
 from glider.tools.own.observer import Observer
 from glider.tools.own.observers import observer_of
 from glider.tools.own.posterior import Engine
@@ -46,7 +47,7 @@ def diagnose_own(
     observer = observer_of(vehicle, list(runs))
     for note in observer.notes:
         say(note)
-    return Engine(observer, healthy_of(observer), say).run(), observer
+    return posterior_of(Engine(observer, healthy_of(observer), say)), observer
 
 
 def verdict_of(chances: dict[str, float]) -> str:

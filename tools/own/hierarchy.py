@@ -13,7 +13,8 @@ import numpy as np
 
 from glider.tools.inference.pooled import Parabola
 from glider.tools.own.declare import Declaration
-from glider.tools.own.effects import FORM, NOISE, PUSH, Effect, driven_inputs, moved
+from glider.tools.own.driven import driven_inputs
+from glider.tools.own.effects import FORM, NOISE, PUSH, Effect, moved
 from glider.tools.own.near import errors_near
 from glider.tools.own.observer import NO_LINEAR, Filtered, Observer
 from glider.tools.own.operating_points import point_weights

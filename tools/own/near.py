@@ -11,7 +11,8 @@ import numpy as np
 
 from glider.tools.own import kernels as names
 from glider.tools.own.compiled import RaisedError
-from glider.tools.own.effects import ModelPoint, driven_inputs, forces, held_inputs
+from glider.tools.own.driven import driven_inputs, forces, held_inputs
+from glider.tools.own.effects import ModelPoint
 from glider.tools.own.observer import Filtered, Observer
 
 MOST_ROWS = 400_000  # of models flown at once: memory

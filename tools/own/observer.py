@@ -19,14 +19,8 @@ from glider.tools.data.runs.gate import SLOWEST_ROWS
 from glider.tools.own import kernels as names
 from glider.tools.own.compiled import RaisedError
 from glider.tools.own.declare import ANGLE, QUATERNION, USUAL_START, USUAL_TOLERANCE, Declaration
-from glider.tools.own.effects import (
-    ModelPoint,
-    driven_inputs,
-    forces,
-    held_inputs,
-    nominal_point,
-    with_run_numbers,
-)
+from glider.tools.own.driven import driven_inputs, forces, held_inputs
+from glider.tools.own.effects import ModelPoint, nominal_point, with_run_numbers
 from glider.tools.own.load import LoadedVehicle, called, user_error
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.steps import HORIZON, TIME_CONSTANTS, choose_parts, time_constant

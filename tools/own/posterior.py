@@ -21,21 +21,17 @@ from glider.tools.own.decision import (
     Deviations,
     Healthy,
     Hypothesis,
-    Posterior,
-    decide,
     log_odds,
     log_prior,
     strangeness,
 )
 from glider.tools.own.effects import FORM, NOISE, PUSH, UNEXPLAINED, moved
 from glider.tools.own.evidence import Place, alone, size_evidence, under_priors
-from glider.tools.own.excess_noise import NoisyWindows, Responses, blocks_of, responses
 from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room, shortened
 from glider.tools.own.observer import Observer
 from glider.tools.own.sessions import TIMES, times_log_prior
 from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 
-NOISES_TRIED = 3  # labels of noises beside a hypothesis
 BEAM, MOST_EFFECTS = 6, 3
 ROUNDS, FIRST_ROUNDS = 5, 20  # of a hypothesis at most; of that from which all others begin
 BEHIND = 8.0  # nat that the best is ahead of a hypothesis that is not led on
@@ -142,7 +138,7 @@ class Engine:
                 way = np.abs([here.shared - last.shared, *(here.own - last.own)]) / rooms
                 here, longest = last, SHORTER_WAY * min(longest, float(way.max()))
             last, shared, own, found = here, here.shared, here.own, here.found
-            by, pooled, evidence, _, sd = self._best_sizes(found, places, shared)
+            by, pooled, evidence, _, sd = self.best_sizes(found, places, shared)
             values = replace(pooled, V=by.V).mean()
             led = np.array([run_values(one, values, by.scatter) for one in found])
             predicted_gain = sum(one.value - one.at_place(x) for one, x in zip(found, led, strict=True))
@@ -206,7 +202,7 @@ class Engine:
                 found[forces, forces] += (form * shared[k] * reach[k] / reach[forces]) ** 2 / len(forces)
         return found
 
-    def _best_sizes(
+    def best_sizes(
         self, found: Sequence[Expansion], places: Sequence[int], shared: np.ndarray
     ) -> tuple[Deviations, Pooled, float, np.ndarray, np.ndarray]:
         """Deviations with the most probable prior without form errors, runs pooled with the most probable of all, log
@@ -259,7 +255,7 @@ class Engine:
     def screen(self, begin: Hypothesis) -> list[tuple[float, str]]:
         """Every other label beside a hypothesis by its parabola: log evidence gained, best first."""
         places = self.healthy.at(begin.labels)
-        _, pooled, *_ = self._best_sizes(begin.found, places, begin.shared)
+        _, pooled, *_ = self.best_sizes(begin.found, places, begin.shared)
         gain, _ = self.label_gains(*alone(pooled))
         gain[places] = -np.inf
         return [(float(gain[k]), self.healthy.effects[k].label) for k in np.argsort(-gain) if np.isfinite(gain[k])]
@@ -268,7 +264,7 @@ class Engine:
         """Labels in the place of a hypothesis' last one that come nearest to it where it leads, with their starts; of
         those that were tried, such as are more probable from here than from where they began."""
         places = self.healthy.at(begin.labels[:-1])
-        _, pooled, *_ = self._best_sizes(begin.found, places, begin.shared)
+        _, pooled, *_ = self.best_sizes(begin.found, places, begin.shared)
         gain, size = self.label_gains(*alone(pooled))
         (replaced,), starts = self.healthy.at(begin.labels[-1:]), []
         predicted = begin.evidence + gain - gain[replaced]
@@ -316,7 +312,7 @@ class Engine:
             starts.append((self.healthy.effects[k].label, replace(self.bare, shared=shared, own=own, everywhere=False)))
         return starts
 
-    def run(self) -> Posterior:
+    def hypotheses(self) -> list[Hypothesis]:
         """Hypotheses found by a beam: none, the best single labels, pairs beside the best, triples."""
         begin = self.expansions(np.zeros((self.count, self.k)), np.arange(self.k))
         self.reach = np.sqrt(np.mean([one.reach for one in begin], axis=0))
@@ -357,58 +353,4 @@ class Engine:
             for one in every:
                 if all(one is not kept for kept in front):
                     one.forget()
-        alone = sorted((one for one in every if len(one.labels) == 1), key=lambda one: -one.evidence)
-        every += self.with_noise([nothing, *alone[:1]], nothing)
-        return decide(every, self.healthy, self.reach, self.count)
-
-    def with_noise(self, beside: Sequence[Hypothesis], nothing: Hypothesis) -> list[Hypothesis]:
-        """Hypotheses with excess noise or an oscillation at one of the model's noises beside them.
-
-        What healthy runs gain by one is taken from it: noise is excess only beyond that.
-        """
-        usual, found = self.healthy.noise_gain, list[Hypothesis]()
-        noises = [one for one in self.healthy.effects if one.family == NOISE] if usual else []
-        for begin in beside if noises else ():
-            columns = self.columns(self.healthy.at(begin.labels))
-
-            def of_run(n: int, begin=begin, columns=columns) -> tuple[Expansion, Responses]:
-                point = moved(self.observer.declared, self.observer.point, self.healthy.effects, begin.own[n])
-                return (self.expansion_of(n, begin.own[n], columns, keep=True, leveled=False),
-                        responses(self.observer.about(point), n, self.horizon, self.healthy.errors))  # fmt: skip
-
-            runs, flown = map(list, zip(*self.observer.each_run(of_run), strict=True))
-            tried: list[tuple[float, str, NoisyWindows]] = []
-            for place, one in enumerate(noises):
-                for block in blocks_of(place):
-                    windows = NoisyWindows(flown, block, self.healthy.errors, self.healthy.eta)
-                    if windows.reach > LEAST_REACH and one.odds > 0.0:
-                        gain = max(windows.gain(size / windows.reach) for size in SIZES)
-                        tried.append((gain - windows.windows * usual.get(one.label, 0.0), one.label, windows))
-            tried.sort(key=lambda one: -one[0])
-            best = dict((label, windows) for _, label, windows in reversed(tried))
-            for label in list(dict.fromkeys(label for _, label, _ in tried))[:NOISES_TRIED]:
-                found.append(self._noisy(begin, label, best[label], runs, nothing))
-        return found
-
-    def _noisy(
-        self, begin: Hypothesis, label: str, windows: NoisyWindows, runs: list[Expansion], nothing: Hypothesis
-    ) -> Hypothesis:
-        """A label of a noise beside a hypothesis: evidence over all sizes, all that was fitted integrated out again."""
-        labels, places = (*begin.labels, label), self.healthy.at(begin.labels)
-        table = []
-        for size in SIZES:
-            noisy = windows.marginalised(runs, size / windows.reach, self.level.of)
-            _, _, evidence, mean, sd = self._best_sizes(noisy, places, begin.shared)
-            table.append((evidence, mean, sd))
-        evidence = float(logsumexp([row[0] for row in table]) - np.log(len(SIZES)))
-        evidence -= windows.windows * self.healthy.noise_gain.get(label, 0.0)
-        _, mean, sd = max(table, key=lambda row: row[0])
-        size, error = windows.size(SIZES[-1])
-        self.reach[self.healthy.at([label])] = windows.reach
-        evidence += log_prior(self.healthy, labels)
-        found = replace(begin, labels=labels, evidence=evidence, sizes=np.append(mean, size),
-                        sd=np.append(sd, error), left=windows.left(size))  # fmt: skip
-        found.strange = strangeness(self.healthy, found, nothing)
-        gain, left = found.evidence - nothing.evidence, np.sqrt(found.left.mean())
-        self.say(f"{' + '.join(labels)}: {gain:.1f} nat, {left:.2f} left")
-        return found
+        return every

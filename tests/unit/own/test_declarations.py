@@ -13,7 +13,8 @@ from glider.tools.own.cases import own_vehicle
 from glider.tools.own.check import check_model, load_own
 from glider.tools.own.decision import log_odds
 from glider.tools.own.declare import DeclarationError, Output, column_of, declaration, with_groups
-from glider.tools.own.effects import driven_inputs, effects_of, held_inputs, moved, nominal_point, standard_effects
+from glider.tools.own.driven import driven_inputs, held_inputs
+from glider.tools.own.effects import effects_of, moved, nominal_point, standard_effects
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun, load_own_run, load_own_runs
 from glider.tools.own.skeleton import write_skeleton

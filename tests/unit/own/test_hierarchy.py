@@ -22,7 +22,6 @@ from glider.tools.own.decision import (
     usual_share,
     with_usual,
 )
-from glider.tools.own.diagnose import worse
 from glider.tools.own.effects import INPUT, PARAMETER, PUSH, Effect
 from glider.tools.own.evidence import alone
 from glider.tools.own.hierarchy import ChannelErrors, Expansion, RunLevel
@@ -98,7 +97,7 @@ def test_a_few_runs_change_little_of_a_scatter_that_many_have_shown():
 def test_runs_themselves_say_whether_they_are_of_one_session_and_how_far_that_differs(common, own, kind, times):
     random, asked = np.random.default_rng(5), engine(12, session=by_itself(0.8), scatter=by_itself(0.4))
     runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
-    by, _, evidence, *_ = asked._best_sizes(runs, [], np.zeros(3))
+    by, _, evidence, *_ = asked.best_sizes(runs, [], np.zeros(3))
     best, _ = asked.deviations[2 * times + kind]
     assert by.scatter is best.scatter
     assert np.array_equal(by.V, best.V)
@@ -118,7 +117,7 @@ def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
     random = np.random.default_rng(3)
     asked = engine(4, V=np.diag([0.1, 0.0, 0.0]), scatter=by_itself(0.3))
     runs, shared = [run_at(random.normal(size=3), 0.3) for _ in range(4)], random.normal(size=3)
-    by, at, evidence, mean, sd = asked._best_sizes(runs, places, shared)
+    by, at, evidence, mean, sd = asked.best_sizes(runs, places, shared)
     nat = []
     for each, prior in asked.deviations:
         for *sizes, form in itertools.product(*[SIZES.tolist()] * len(places), FORM_SHARES):
@@ -248,7 +247,7 @@ def test_a_fit_ends_where_its_posterior_rests():
     again = asked.fit(("gain",), found)
     assert again.shared == pytest.approx(found.shared, abs=1e-6)
     assert again.evidence == pytest.approx(found.evidence, abs=1e-6)
-    by, *_ = asked._best_sizes(found.found, [0], found.shared)
+    by, *_ = asked.best_sizes(found.found, [0], found.shared)
     assert found.shared[2] == pytest.approx(Pooled.of(by.marginal(found.found), by.V).mean()[2])
     assert np.diag(by.V)[2] in np.diag(asked.deviations[0][0].V) + np.diag(asked.deviations[1][0].V)
 
@@ -395,10 +394,3 @@ def test_an_effect_stands_beside_another_only_beyond_what_its_form_may_lack(size
     assert (both.weights[2] > 0.5) == beside
     ratio = both.weights[1] / both.weights[0]
     assert ratio == pytest.approx(np.divide(*decide(alone, one, np.ones(3), 4).weights[::-1]))
-
-
-@pytest.mark.parametrize(("after", "shrinkage", "cautions"), [(4.4, -0.36, 1), (0.8, 0.75, 0), (4.4, None, 0)])
-def test_a_cause_with_which_the_gap_grows_comes_with_a_caution(after, shrinkage, cautions):
-    found = worse({"before": {"total": 3.24}, "after": {"total": after}, "shrinkage": {"value": shrinkage}})
-    assert len(found) == cautions
-    assert not cautions or "3.24 -> 4.40" in found[0]

@@ -12,7 +12,8 @@ from glider.tools.own import kernels
 from glider.tools.own.check import load_own
 from glider.tools.own.declare import DERIVED
 from glider.tools.own.diagnose import diagnose_own
-from glider.tools.own.effects import driven_inputs, moved, noise_effects, nominal_point, standard_effects
+from glider.tools.own.driven import driven_inputs
+from glider.tools.own.effects import moved, noise_effects, nominal_point, standard_effects
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import OwnRun
 from glider.tools.own.skeleton import write_skeleton

@@ -11,6 +11,7 @@ from glider.tools.own.check import load_own
 from glider.tools.own.healthy import healthy_of
 from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identify import identify
+from glider.tools.own.noise_hypotheses import posterior_of
 from glider.tools.own.observers import observer_of
 from glider.tools.own.posterior import Engine
 from glider.tools.own.runs import OwnRun
@@ -68,7 +69,7 @@ def test_a_black_box_is_identified_and_a_weaker_heater_is_its_gain(simulator):
     write(found, simulator.parent / "identified")
     again = load_own(simulator.parent / "identified" / VEHICLE)
     observer = observer_of(again, runs(3, 0.3, 2, factor=0.7))
-    chances = Engine(observer, healthy_of(observer)).run().chances
+    chances = posterior_of(Engine(observer, healthy_of(observer))).chances
     assert sum(chances[label] for label in ("heat_gain", "gain", "warmth_gain")) > 0.8  # from rest they act alike
 
 
@@ -84,7 +85,7 @@ def test_a_file_that_no_fit_betters_keeps_its_numbers_and_has_what_runs_leave(si
     assert abs(far) < loss.uncertainty < 0.05  # the file has 0.1
     for factor, right in ((1.0, ("none",)), (0.95, ("heat_gain", "gain", "warmth_gain"))):
         observer = observer_of(again, runs(3, 0.2, 2, factor))
-        chances = Engine(observer, healthy_of(observer)).run().chances
+        chances = posterior_of(Engine(observer, healthy_of(observer))).chances
         assert sum(chances[label] for label in right) > 0.8
 
 

@@ -14,7 +14,7 @@ from glider.tools.inference.model import nominal_model
 from glider.tools.inference.predict import fly_windows_from, observe
 from glider.tools.inference.problem import cut, problem_of
 from glider.tools.own.check import load_own
-from glider.tools.own.effects import forces, held_inputs
+from glider.tools.own.driven import forces, held_inputs
 from glider.tools.own.observers import observer_of
 from glider.tools.own.runs import load_own_runs
 from tests.support.flights import World, fly_case
