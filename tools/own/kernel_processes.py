@@ -29,10 +29,10 @@ class _Processes:
 
     def at_once(self, wanted: int) -> int:
         """How many of `wanted` calls run side by side."""
-        if not self.count and wanted > 1 and self.seconds > START_AFTER:
+        if wanted > max(1, self.count) and self.seconds > START_AFTER:
             command = [sys.executable, "-m", SERVER, str(self.path.resolve())]
             pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-            for _ in range(wanted):  # Ctrl-C is for this process, whose end they notice
+            for _ in range(wanted - self.count):  # Ctrl-C is for this process, whose end they notice
                 self.free.put(subprocess.Popen(command, start_new_session=True, **pipes))
             self.count = wanted
         return min(wanted, self.count or 1)

@@ -65,7 +65,7 @@ parameters = {
     "yaw_inflow": {"unit": "rad/s", "value": -0.6, "uncertainty": 0.4},
     "yaw_wake": {"unit": "rad/s", "value": -0.6, "uncertainty": 0.4},
     "righting": {"unit": "N m/rad", "value": 0.4, "uncertainty": 0.2, "low": 0.05},
-    "load": {"unit": "kg", "value": 0.0},  # weight that it was not identified with; below the centre, its buoyancy off
+    "load": {"unit": "kg", "value": 0.0},  # weight added since, less its buoyancy
 }
 noises = [
     ("heave_force", "m/s2", 0.02), ("roll_moment", "rad/s", 0.05), ("pitch_moment", "rad/s", 0.05),

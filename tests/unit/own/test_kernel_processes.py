@@ -40,7 +40,7 @@ def observer(tmp_path, monkeypatch):
 
 @pytest.fixture
 def processes(observer, monkeypatch):
-    """Those of its kernels, started at once; how many calls they answered."""
+    """Those of its kernels, that are started without a wait."""
     monkeypatch.setattr(kernel_processes, "START_AFTER", -1.0)
     started = observer.vehicle.kernels.at_once.__self__
     yield started
@@ -61,9 +61,8 @@ def flown(observer, point=None) -> list[np.ndarray]:
 
 
 def test_they_answer_as_one_process_does(observer, processes):
-    alone = [observer.filter(n, observer.point).gains for n in range(len(observer.runs))]
+    observer.filter(0, observer.point)
     assert processes.count == 0
-    assert all(np.isfinite(one).all() for one in alone)
     before, spent = flown(observer), processes.seconds
     assert processes.count == 2
     assert processes.seconds == spent  # nothing more was flown here
