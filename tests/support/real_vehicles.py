@@ -79,6 +79,7 @@ def blimp(data: Path, out: Path) -> None:
     asked(out, "identify", "identify", "healthy", "--vehicle", BLIMP, "--out", "identified")
     vehicle = "identified/identified.toml"
     copied(out / "kept", kept)
+    copied(out / "eight", kept[::2][:8])  # whose diagnosis the page has a time of
     for name, model in (("published", BLIMP), ("kept", vehicle)):
         gap = asked(out, f"gap-{name}", "gap", "measure", "kept", "--vehicle", model)
         print(

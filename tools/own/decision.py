@@ -279,7 +279,5 @@ def confounded(group: Sequence[str], what: str) -> list[str]:
 
 def from_one_session(sessions: int) -> list[str]:
     """A caution, where it is not known what sessions differ by."""
-    said = (
-        "identified from one session: what days differ by is assumed, and may be called a cause; identify from several"
-    )
-    return [f"{said}, or watch with healthy runs of the same day as reference"] if sessions == 1 else []
+    said = "identified from one session: what sessions differ by is assumed, and may be called a cause; identify from "
+    return [f"{said}several, or watch with healthy runs of the same one as reference"] if sessions == 1 else []

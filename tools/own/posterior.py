@@ -29,7 +29,7 @@ from glider.tools.own.effects import FORM, NOISE, PUSH, UNEXPLAINED, moved
 from glider.tools.own.evidence import Place, alone, size_evidence, under_priors
 from glider.tools.own.hierarchy import LEAST_REACH, Expansion, RunLevel, expand, followed, room, shortened
 from glider.tools.own.observer import Observer
-from glider.tools.own.sessions import TIMES, times_log_prior
+from glider.tools.own.sessions import each_of_times
 from glider.tools.own.strong import STRONG_LEFT, strong_sizes
 
 BEAM, MOST_EFFECTS = 6, 3
@@ -51,10 +51,10 @@ class Engine:
         self.active = (np.diag(healthy.V) > 0.0) | (healthy.scatter.sizes > 0.0)
         # runs of one session, or each of another, and how far these differ: which, their evidence says
         self.deviations = list[tuple[Deviations, float]]()
-        for times, prior in zip(TIMES, times_log_prior(healthy.sessions), strict=True):
-            T = replace(healthy.session, sizes=times * healthy.session.sizes).covariance
-            apart = Deviations(healthy.V, Scatter.of(healthy.scatter.covariance + T))
-            self.deviations += [(Deviations(healthy.V + T, healthy.scatter), prior), (apart, prior)]
+        for session, prior in each_of_times(healthy.session, healthy.sessions):
+            apart = Deviations(healthy.V, Scatter.of(healthy.scatter.covariance + session.covariance))
+            together = Deviations(healthy.V + session.covariance, healthy.scatter)
+            self.deviations += [(together, prior), (apart, prior)]
         self.together = self.deviations[0][0]
         # constant numbers that a hypothesis may add; noises are weighed beside them (excess_noise.py)
         self.candidate = np.array([one.family not in (FORM, NOISE) and one.odds > 0.0 for one in healthy.effects])

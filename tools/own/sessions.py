@@ -3,9 +3,9 @@
 Another day's trim, water or battery is no cause (docs/how-to/own-vehicle.md, The method). With x_n = s + t_j + d_n, s ~
 N(0, C) as identified and t_j ~ N(0, times^2 T), what is known of a new session is s given the reference's runs, and t_j
 beside it; `times`, how far it differs over what identified sessions do, has the prior that so few of them leave
-(Student's t), and is taken where it is most probable. Of a label over a span S of a session's runs, all that they share
-integrated out, slope and precision are r_S - H_S M r and H_S - H_S M H_S, with H, r the pooled session's and M the
-covariance that it leaves.
+(Student's t), and is taken where it is most probable; a diagnosis sums over it (posterior.py). Of a label over a span S
+of a session's runs, all that they share integrated out, slope and precision are r_S - H_S M r and H_S - H_S M H_S, with
+H, r the pooled session's and M the covariance that it leaves.
 """
 
 from collections.abc import Iterable, Sequence
@@ -60,13 +60,17 @@ def split(sessions: Sequence[Session], first: int, another: Another) -> list[Ses
 def of_another(runs: Sequence[Parabola], V: np.ndarray, session: Scatter, learned_from: int) -> list[Another]:
     """What is known of another session, for each of TIMES: V of the identified vehicle, runs of the reference
     (tempered, their own deviations integrated out), session: what sessions differ by, learned from so many."""
-    together = Pooled.of(runs, V).parabola()
-    found, log_priors = list[Another](), times_log_prior(learned_from)
-    for times, log_prior in zip(TIMES, log_priors, strict=True):
-        scatter = replace(session, sizes=times * session.sizes)
+    together, found = Pooled.of(runs, V).parabola(), list[Another]()
+    for scatter, log_prior in each_of_times(session, learned_from):
         known = Pooled.of([marginalised(together, scatter)], V)
-        found.append(Another(known.mean(), known.covariance() + scatter.covariance, float(log_prior)))
+        found.append(Another(known.mean(), known.covariance() + scatter.covariance, log_prior))
     return found
+
+
+def each_of_times(session: Scatter, learned_from: int) -> list[tuple[Scatter, float]]:
+    """What sessions differ by, learned from so many, at each of TIMES, and the log probability of that."""
+    scaled = [replace(session, sizes=times * session.sizes) for times in TIMES]
+    return list(zip(scaled, times_log_prior(learned_from).tolist(), strict=True))
 
 
 def times_log_prior(sessions: int) -> np.ndarray:

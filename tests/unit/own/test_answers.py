@@ -34,5 +34,5 @@ def test_a_cause_with_which_the_gap_grows_comes_with_a_caution(after, shrinkage,
 
 
 @pytest.mark.parametrize(("sessions", "cautions"), [(1, 1), (2, 0)])
-def test_what_days_differ_by_is_not_known_from_one(sessions, cautions):
+def test_what_sessions_differ_by_is_not_known_from_one(sessions, cautions):
     assert len(from_one_session(sessions)) == cautions

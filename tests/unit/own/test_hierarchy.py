@@ -93,7 +93,9 @@ def test_a_few_runs_change_little_of_a_scatter_that_many_have_shown():
     assert known < 0.75 < 1.3 < unknown
 
 
-@pytest.mark.parametrize(("common", "own", "kind", "times"), [(0.8, 0.2, 0, 0), (0.0, 1.2, 1, 0), (6.0, 0.2, 0, 2)])
+@pytest.mark.parametrize(
+    ("common", "own", "kind", "times"), [(0.8, 0.2, 0, 0), (1.5, 0.2, 0, 1), (6.0, 0.2, 0, 2), (0.0, 1.2, 1, 0)]
+)
 def test_runs_themselves_say_whether_they_are_of_one_session_and_how_far_that_differs(common, own, kind, times):
     random, asked = np.random.default_rng(5), engine(12, session=by_itself(0.8), scatter=by_itself(0.4))
     runs = [run_at(np.array([0.0, 0.0, common + own * random.standard_normal()])) for _ in range(12)]
