@@ -67,6 +67,29 @@ def test_the_skeleton_is_a_model_that_passes_its_check(pool):
     assert {"rudder_gain", "depth_bias", "heave_drag"} <= set(found["causes"])
 
 
+def test_a_column_in_another_unit_is_said_before_anything_is_fitted(pool):
+    folder, case, _ = pool
+    case("centimetres", 41, runs=2, read=lambda n, y: y * [100.0, 1.0, 1.0])
+    case("metres", 42, runs=2)
+    known = "--vehicle", "identified/identified.toml"
+    found = glider("gap", "readings", "centimetres", *known, "--json", cwd=folder)
+    assert found.returncode == 0, found.stderr
+    first = json.loads(found.stdout)["readings"][0]
+    assert (first["columns"], first["times"]) == (["depth_m"], 0.01)
+    assert "depth_m times 0.01" in glider("gap", "measure", "centimetres", *known, cwd=folder).stderr
+    assert "no column" in glider("gap", "readings", "metres", *known, cwd=folder).stdout
+
+
+def test_that_a_model_has_no_noises_is_said(pool):
+    folder, *_ = pool
+    text = (folder / "mine_model.py").read_text()
+    calm = text.replace('noises = [("heave", "m/s2", 0.01), ("yawing", "rad/s2", 0.01)]', "noises = {}")
+    (folder / "calm_model.py").write_text(calm.replace(" + w[0]", "").replace(" + w[1]", ""))
+    (folder / "calm.toml").write_text('format = 1\nmodel = "calm_model"\n')
+    checked = glider("vehicle", "check", "calm.toml", cwd=folder)
+    assert "no noises are declared" in checked.stdout, checked.stdout + checked.stderr
+
+
 def test_identification_finds_the_numbers_and_predicts_runs_left_out_better(pool):
     _, _, answer = pool
     assert answer["handed_out"] == "identified"

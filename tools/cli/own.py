@@ -1,6 +1,7 @@
 """What the commands on cases do where the vehicle is a model of the user's (docs/how-to/own-vehicle.md)."""
 
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,12 +33,37 @@ def tell(text: str) -> None:
     print(text, file=sys.stderr)
 
 
+def readings(vehicle: Any, case: Path, as_json: bool) -> None:
+    """Columns of a case that a user's model follows far better if they are read otherwise."""
+    from glider.tools.own.columns_tried import tried
+    from glider.tools.own.runs import load_own_runs
+
+    found = tried(vehicle, load_own_runs(case, vehicle.declared))
+    lines = [
+        f"{one['what']}  channels' errors, multiplied, fall by a factor of {math.exp(one['nat']):.3g} or more"
+        for one in found
+    ]
+    nothing = "no column is followed far better in another unit, with the other sign, or exchanged for another"
+    print_lines(lines or [nothing], as_json, {"readings": found})
+
+
+def _doubted(vehicle: Any, runs: Any) -> None:
+    """A note on every column that is followed far better if it is read otherwise."""
+    from glider.tools.own.columns_tried import tried
+
+    if vehicle.level and vehicle.kernels.compiled:
+        for one in tried(vehicle, runs):
+            say(f"note: the model follows these runs far better with {one['what']}")
+
+
 def measure(vehicle: Any, case: Path, as_json: bool) -> None:
     """Gaps per run and channel of a user's model."""
     from glider.tools.own.measure import measure as measure_runs
     from glider.tools.own.runs import load_own_runs
 
-    found = measure_runs(vehicle, load_own_runs(case, vehicle.declared))
+    runs = load_own_runs(case, vehicle.declared)
+    _doubted(vehicle, runs)
+    found = measure_runs(vehicle, runs)
     for note in found["notes"]:
         say(f"note: {note}")
     if as_json:
@@ -141,7 +167,9 @@ def identify(vehicle: Any, cases: Sequence[Path], out: Path | None, as_json: boo
     from glider.tools.own.identify import identify as identify_runs
     from glider.tools.own.runs import load_own_runs
 
-    found = identify_runs(vehicle, [load_own_runs(case, vehicle.declared) for case in cases], tell)
+    sessions = [load_own_runs(case, vehicle.declared) for case in cases]
+    _doubted(vehicle, [run for session in sessions for run in session])
+    found = identify_runs(vehicle, sessions, tell)
     if out is not None:
         write(found, out)
         say(f"vehicle: {out / VEHICLE}")
@@ -158,6 +186,8 @@ def identify(vehicle: Any, cases: Sequence[Path], out: Path | None, as_json: boo
     )
     for name in (name for name in gap["before"] if name != "total" and gap["before"][name] is not None):
         click.echo(f"  {name:<12} {gap['before'][name]:6.2f} -> {gap['after'][name]:6.2f}")
+    for case, one in zip(cases, answer["sessions"], strict=True) if len(cases) > 1 else ():
+        click.echo(f"  session {case.name}: {one['before']['total']:.2f} -> {one['after']['total']:.2f}")
     click.echo(f"{'':<16} {'file':>10} {'mean':>10} {'sd':>9}   90 % interval")
     for one in answer["parameters"]:
         low, high = one["ci90"]

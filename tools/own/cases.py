@@ -37,7 +37,7 @@ def import_template(name: str, vehicle: Path | None, out: Path) -> str:
     if vehicle is None:
         return template(name)
     target = _columns_of(vehicle)
-    return template(name, target.columns, os.path.relpath(vehicle.resolve(), out.resolve().parent))
+    return template(name, target.units, os.path.relpath(vehicle.resolve(), out.resolve().parent))
 
 
 def import_target(mapping: str) -> Target:
@@ -56,6 +56,7 @@ def import_target(mapping: str) -> Target:
 def _columns_of(file: Path) -> Target:
     """The columns that the model of a vehicle file declares; InputError or ConfigError where it is none."""
     declared = read_own(file).declared
-    columns = (*(one.column for one in declared.inputs), *(one.column for one in declared.outputs))
+    units = {one.column: one.unit for one in declared.inputs} | {one.column: one.unit for one in declared.outputs}
     held = frozenset(one.column for one in declared.inputs if not one.interpolated)
-    return Target(columns, held, frozenset(one.column for one in declared.outputs if one.angle), file)
+    angles = frozenset(one.column for one in declared.outputs if one.angle)
+    return Target(tuple(units), held, angles, file, units)

@@ -7,7 +7,7 @@ are counted in spreads.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,10 +63,16 @@ class ChannelErrors:
     scales: np.ndarray  # (y,)
     inflation: np.ndarray  # (y,)
     whitenings: Sequence[Callable[[np.ndarray], np.ndarray]] = ()  # by run; none: errors are thought independent
+    # by run: times as large as `scales` all of its errors are; none: as large
+    levels: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def level(self, n: int) -> float:
+        """By how much all errors of run n are larger."""
+        return float(self.levels[n]) if len(self.levels) else 1.0
 
     def independent(self, n: int, errors: np.ndarray) -> np.ndarray:
         """Errors (..., rows, y) of run n, in tolerances, independent and of variance 1 as far as is known."""
-        return self.whitenings[n](errors) if self.whitenings else errors / self.scales
+        return (self.whitenings[n](errors) if self.whitenings else errors / self.scales) / self.level(n)
 
     def misfit(self, n: int, errors: np.ndarray) -> np.ndarray:
         """Sum of squares (...) that errors (..., rows, y) of run n, in tolerances, count."""
@@ -196,19 +202,20 @@ def followed(
 
 @dataclass(frozen=True)
 class RunLevel:
-    """Errors of a run may all be larger than healthy runs' by a factor r >= 1 of the run's own.
+    """Squared errors of a run may all be larger than healthy runs' by a factor r of the run's own.
 
-    log r is half-normal, of 1 sigma `scatter`: with N independent errors whose squares sum to S, -2 log likelihood is
-    the least of S / r + N log r + (log r / scatter)^2 over r.
+    log r is normal, of 1 sigma `scatter`, and at least `least`: with N independent errors whose squares sum to S, -2
+    log likelihood is the least of S / r + N log r + (log r / scatter)^2 over r.
     """
 
     errors: ChannelErrors
     eta: float
     scatter: float
+    least: float = 0.0
 
     def log_level(self, squares: float, count: float) -> float:
         """The most probable log r."""
-        if self.scatter <= 0.0 or squares <= count or not np.isfinite(squares):
+        if self.scatter <= 0.0 or not np.isfinite(squares) or (squares <= count and self.least == 0.0):
             return 0.0
         level = 0.0
         for _ in range(LEVEL_ROUNDS):
@@ -217,7 +224,7 @@ class RunLevel:
             level -= float(np.clip(step, -1.0, 1.0))
             if abs(step) < LEVEL_AT_REST:
                 break
-        return level
+        return max(level, self.least)
 
     def count(self, one: Expansion) -> float:
         """Independent errors of a run."""

@@ -19,6 +19,7 @@ from glider.tools.own.model_files import moved_to, write_with_folders
 from glider.tools.own.runs_fit import MIN_SCATTER_RUNS
 
 VEHICLE, ANSWER = "identified.toml", "identified.json"
+FAR = 3.0  # sigma of the file: a number that is said to be farther from it
 
 
 def _text(value: Any) -> str:
@@ -99,7 +100,7 @@ def tables(found: Identified) -> dict[str, Any]:
     units = np.array([found.nuisance[k].spread for k in places])
     covariance = errors[np.ix_(places, places)] * np.outer(units, units)
     given["identified"] = {
-        "runs": len(observer.runs), "sessions": found.sessions, "parameters": names,
+        "runs": len(observer.runs), "sessions": len(found.counts), "parameters": names,
         "covariance": [[float(value) for value in row] for row in covariance], "inflation": found.eta,
         "run_inflation": found.run_inflation,
         "level_scatter": found.level_scatter,
@@ -126,6 +127,11 @@ def _doubtful(found: Identified, rows: Sequence[Mapping[str, Any]]) -> list[str]
     turned = [row for row in rows if row["name"] in known and max(row["file"] * end for end in row["ci90"]) < 0.0]
     said = [f"{row['name']} changes its sign, {row['file']:.4g} to {row['mean']:.4g}: `low` or `high` in the vehicle "
             "file rules that out" for row in turned]  # fmt: skip
+    file = {one.name: one for one in found.vehicle.declared.parameters}
+    far = [row for row in rows if row["name"] in known and file[row["name"]].uncertainty > 0.0
+           and abs(row["mean"] - row["file"]) > FAR * file[row["name"]].uncertainty]  # fmt: skip
+    said += [f"{row['name']} is {abs(row['mean'] - row['file']) / file[row['name']].uncertainty:.1f} sigma from the "
+             f"file's {row['file']:.4g}: {row['mean']:.4g} +- {row['sd']:.2g}" for row in far]  # fmt: skip
     if count < MIN_SCATTER_RUNS:
         said.append(f"how runs differ is assumed, not learned: {MIN_SCATTER_RUNS} runs are needed, got {count}")
     return said
@@ -153,13 +159,22 @@ def plain(found: Identified) -> dict[str, Any]:
         "format": 1, "vehicle": found.vehicle.name, "parameters": rows, "groups": groups(found),
         "operating_points": {"count": len(found.vehicle.declared.operating_points), "scatter": _operating(found)},
         "gap": {"before": gap_row(names, found.before), "after": gap_row(names, found.after)},
+        "sessions": [{"first": runs[0], "runs": len(runs), **{name: gap_row(names, gaps[at]) for name, gaps in
+                      (("before", found.before), ("after", found.after))}} for runs, at in _sessions(found)],
         "horizon_s": found.observer.horizon,
         "channel_ratio": found.channel_ratio, "handed_out": "identified" if found.better else "file",
         "runs": [run.name for run in found.observer.runs],
         "notes": [
-            *found.observer.notes, *found.notes, *shown, *_doubtful(found, rows), *from_one_session(found.sessions),
+            *found.observer.notes, *found.notes, *shown, *_doubtful(found, rows), *from_one_session(len(found.counts)),
         ],
     }  # fmt: skip
+
+
+def _sessions(found: Identified) -> list[tuple[list[str], slice]]:
+    """Runs of every session by name, and where they stand among all."""
+    ends = np.cumsum(found.counts).tolist()
+    every = [slice(end - count, end) for end, count in zip(ends, found.counts, strict=True)]
+    return [([run.name for run in found.observer.runs[at]], at) for at in every]
 
 
 def _together(found: Identified) -> dict[str, Any]:

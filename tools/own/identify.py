@@ -48,6 +48,7 @@ from glider.tools.own.runs_fit import (
     by_channel,
     left_by,
     left_out,
+    level_logs,
     level_scatter,
 )
 from glider.tools.own.usual_effects import usual_labels, with_usual_effects
@@ -76,7 +77,7 @@ class Identified:
     before: np.ndarray  # (runs, outputs) gaps of the file's model, tolerances
     after: np.ndarray  # the same of a model of the other runs
     level_scatter: float
-    sessions: int
+    counts: list[int]  # runs of every session, in order
     session_scatter: Scatter  # from session to session beside that
     operating_scatter: dict[str, float]  # by noise, spreads: 1 sigma of what goes with operating points
     noise_gain: dict[str, float]  # nat a window that excess noise gains in healthy runs, by label
@@ -188,6 +189,7 @@ def identify(
     between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
+    logs = level_logs(found, errors)
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     after = fit.held_out(every, others)
     labels, usual_of_labels = usual_labels(replace(fit, scatter=scatter), others, eta)
@@ -195,8 +197,8 @@ def identify(
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, usual_of_labels, eta, between,
-                      errors, components, own, before, after, level_scatter(found), len(sessions), session_scatter,
-                      operating_scatter, noise_gain, [one.label for one in added], notes)  # fmt: skip
+                      errors, components, own, before, after, level_scatter(logs), counts,
+                      session_scatter, operating_scatter, noise_gain, [one.label for one in added], notes)  # fmt: skip
 
 
 def with_components(
@@ -214,8 +216,9 @@ def with_components(
     found = [patterns(observer.about(moved(declared, observer.point, fit.nuisance, row)), n, observer.horizon)
              for n, row in enumerate(fit.own)]  # fmt: skip
     each = np.ones(len(declared.noises))
+    at_level = [replace(one, errors=one.errors / fit.errors.level(n)) for n, one in enumerate(found)]
     learned = learn_components(
-        found, Components(np.sqrt(observer.point.variance) / observer.tolerances, each, each, 1.0)
+        at_level, Components(np.sqrt(observer.point.variance) / observer.tolerances, each, each, 1.0)
     )
     say(f"errors of windows: {learned.said(declared)}")
     tried = replace(fit, errors=replace(fit.errors, whitenings=[Whitening(one, learned) for one in found]))

@@ -62,6 +62,8 @@ def describe(file: Path, case: Path | None, compile_observer: Callable[[], None]
             f"{observer.parts} parts a step"
         )
         lines += observer.notes
+    if vehicle.level and not declared.noises:
+        lines.append("no noises are declared: the filter trusts the model, and what that lacks is seen by no force")
     lines += vehicle.notes + _ungrouped(declared)
     return {
         "name": vehicle.name, "level": vehicle.level, "compiled": bool(vehicle.level and vehicle.kernels.compiled),

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import (
     Parabola,
     Pooled,
@@ -31,6 +32,7 @@ DAMPINGS = 8  # tried at most, from the least on that keeps steps short
 UNSEEN = 1e-3  # curvature that is damped where runs say nothing
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
+USUAL_LEVEL_SCATTER, TINY = 0.5, 1e-300  # of one run; of a square: none
 LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
 
 
@@ -69,8 +71,12 @@ class RunsFit:
         return fit
 
     def led_with_differences(self, say: Callable[[str], None]) -> "RunsFit":
-        """The fit led on until it rests, how runs differ learned, and what the form of the model cannot do."""
+        """The fit led on until it rests, how runs differ learned, and what the form of the model cannot do.
+
+        Errors of each run are as large as its own weather has them (`own_levels`): a rough day outweighs no calm one.
+        """
         fit, learned = replace(self), 0 if len(self.own) >= MIN_SCATTER_RUNS else SCATTER_ROUNDS
+        fit.errors = replace(fit.errors, levels=own_levels(fit.expansions(), fit.errors))
         for _ in range(ROUNDS):
             found = fit.expansions(keep_filter=True)
             level = RunLevel(fit.errors, float(inflation(found)[-1]), 0.0)
@@ -80,14 +86,17 @@ class RunsFit:
                 scatter, _ = learn_scatter_together(warm, fit.V, fit.usual, by_channel(found))
                 fit.scatter = scatter if learned == 0 else fit.scatter.half_way(scatter)
                 learned += 1
-            if fit.stepped(warm, found, level, say) and learned == SCATTER_ROUNDS:
+            rests = fit.stepped(warm, found, level, say)
+            before, fit.errors = fit.errors, replace(fit.errors, levels=own_levels(found, fit.errors))
+            still = np.abs(np.log(fit.errors.levels / before.levels)).max() < CONVERGED_SCALE
+            if rests and still and learned == SCATTER_ROUNDS:
                 break
         return fit
 
     def at_levels(self) -> tuple[list[Expansion], list[Expansion], RunLevel]:
         """Every run at its own level of errors, as it is and tempered."""
         found = self.expansions(keep_filter=True)
-        scatter = level_scatter(found)
+        scatter = level_scatter(level_logs(found, self.errors))
         plain = RunLevel(self.errors, 1.0, scatter)
         weighted = [one.weighted(plain.share(one)) for one in found]
         level = RunLevel(self.errors, float(inflation(weighted)[-1]), scatter)
@@ -124,10 +133,22 @@ class RunsFit:
         return bool(gain < CONVERGED_GAIN and np.abs(np.log(scales / before)).max() < CONVERGED_SCALE)
 
 
-def level_scatter(found: Sequence[Expansion]) -> float:
-    """1 sigma from run to run of the logarithm of the mean square that is left."""
-    logs = np.log([one.squares.sum() / max(1, one.samples.sum()) for one in found])
-    return float(logs.std(ddof=1)) if len(logs) > 1 else 0.5
+def level_logs(found: Sequence[Expansion], errors: ChannelErrors) -> np.ndarray:
+    """Logarithms (runs,) of the mean squares that runs leave, at no level of their own."""
+    mean = [one.squares.sum() / max(1, one.samples.sum()) for one in found]
+    return np.log(np.maximum(mean, TINY)) + 2.0 * np.log([errors.level(n) for n in range(len(found))])
+
+
+def level_scatter(logs: np.ndarray) -> float:
+    """1 sigma from run to run of `level_logs`."""
+    return float(logs.std(ddof=1)) if len(logs) > 1 else USUAL_LEVEL_SCATTER
+
+
+def weather_scatter(logs: np.ndarray, counts: np.ndarray) -> float:
+    """What of that is runs' own weather: beyond what so many independent errors, counts (runs,), make the logarithm of
+    a mean square differ by (chi-squared: 2 / count), and what runs usually differ by, flown one way or another."""
+    usual = float(np.mean(2.0 / counts)) + HEALTHY.run_scale**2
+    return float(np.sqrt(max(level_scatter(logs) ** 2 - usual, 0.0)))
 
 
 def damped_steps(pooled: Pooled, values: np.ndarray) -> Iterator[np.ndarray]:
@@ -177,10 +198,18 @@ def left_out(found: Sequence[Parabola], V: np.ndarray) -> list[Pooled]:
 
 def left_by(found: Sequence[Expansion], errors: ChannelErrors) -> ChannelErrors:
     """What runs leave, channel by channel, where they were expanded; `errors`: in what they were counted."""
-    squares = np.sum([one.gap_squares for one in found], axis=0)
+    squares = np.sum([one.gap_squares / errors.level(n) ** 2 for n, one in enumerate(found)], axis=0)
     samples = np.sum([one.samples for one in found], axis=0)
     scales = np.where(samples > 0, np.sqrt(squares / np.maximum(samples, 1)), errors.scales)
     return replace(errors, scales=np.maximum(scales, LEAST_SCALE), inflation=inflation(found)[:-1])
+
+
+def own_levels(found: Sequence[Expansion], errors: ChannelErrors) -> np.ndarray:
+    """By how much the errors of runs (runs,) are larger than a usual run's, the most probable."""
+    logs, plain = level_logs(found, errors), RunLevel(errors, float(inflation(found)[-1]), 0.0)
+    counts = np.maximum([plain.count(one) for one in found], 1.0)
+    by, about = RunLevel(errors, 1.0, weather_scatter(logs, counts), -np.inf), np.exp(logs - logs.mean())
+    return np.exp(0.5 * np.array([by.log_level(*one) for one in zip(counts * about, counts, strict=True)]))
 
 
 @dataclass

@@ -32,8 +32,8 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
     better is not taken, and is the last.
     """
     added, gone = list[Effect](), set[str]()
-    left = total_rms(fit.left_out_gaps()) if len(fit.own) >= MIN_SCATTER_RUNS else 0.0
-    while left > 0.0:
+    gaps = fit.left_out_gaps() if len(fit.own) >= MIN_SCATTER_RUNS else np.zeros(0)
+    while gaps.any():
         odds, eta = _log_odds(fit, added)
         weak = [one for one in added if odds[one] <= 0.0]
         labels = [one for one in odds if odds[one] > 0.0 and one not in added and one.label not in gone]
@@ -47,12 +47,13 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
         else:
             break
         tried = tried.led_with_differences(say)
-        there = total_rms(tried.left_out_gaps())
+        levels, theirs = fit.errors.levels[:, None], tried.left_out_gaps()
+        left, there = (total_rms(one / levels) for one in (gaps, theirs))
         have = ", ".join(one.label for one in new) or "none of these"
-        say(f"runs left out {left:.2f} -> {there:.2f} tolerances, if all runs have {have}")
+        say(f"runs left out {left:.2f} -> {there:.2f} tolerances at their levels, if all runs have {have}")
         if there >= left:
             break
-        fit, added, left = tried, new, there
+        fit, added, gaps = tried, new, theirs
     return fit, added
 
 

@@ -14,7 +14,7 @@ from glider.hal.strict import ConfigError
 from glider.tools.cli.import_ import import_
 from glider.tools.data.errors import InputError
 from glider.tools.data.importers.csvlog import import_csv
-from glider.tools.data.importers.mapping import UNITS, decode_map, load_map
+from glider.tools.data.importers.mapping import UNITS, Target, decode_map, load_map
 from glider.tools.data.runs.case import load_case
 
 MAP = """\
@@ -172,6 +172,15 @@ def test_times_that_do_not_go_on(folder):
         _import(folder)
     imported = _import(folder, text=MAP.replace('unit = "ms"', 'unit = "ms"\nnot_increasing = "drop"'))
     assert re.search(r"1 of 239 rows .*\(line 31\)$", imported.notes[0])
+
+
+def test_a_row_written_twice_is_named_with_its_own_time(folder):
+    lines = synthetic().splitlines()
+    lines.insert(20, lines[20])
+    (folder / "a.csv").write_text("\n".join(lines))
+    moment = (float(lines[20].split(",")[0]) - float(lines[1].split(",")[0])) / 1000.0
+    with pytest.raises(InputError, match=rf"a.csv:22: .*go on: {moment:g} s after {moment:g} s"):
+        _import(folder)
 
 
 def test_dates_are_times_too(folder):
@@ -398,3 +407,27 @@ def test_after_an_import_one_table_says_what_is_in_it(folder):
     plain = json.loads(CliRunner().invoke(import_, [*asked, str(folder / "d"), "--json"]).stdout)
     assert [one["name"] for one in plain["columns"]] == ["t_s", "pitch_rad", "yaw_rad", "depth_m"]
     assert plain["seconds"] == [pytest.approx(2.0, abs=0.11)]
+
+
+def of_a_model(unit: str, declared: str) -> dict:
+    """A mapping of one column, logged in `unit`, of a model that declares it in another."""
+    target = Target(("value",), vehicle=Path("mine.toml"), units={"value": declared})
+    text = f'format = 1\nvehicle = "mine.toml"\n[time]\ncolumn = "t"\n[columns.value]\nsource = "v"\nunit = "{unit}"\n'
+    return decode_map(text, "map.toml", target).columns
+
+
+@pytest.mark.parametrize(
+    ("unit", "declared", "logged", "wanted"),
+    [("rpm", "1/s", 120.0, 2.0), ("%", "1", 40.0, 0.4), ("cm/s", "m/s", 150.0, 1.5),
+     ("kn", "m/s", 1.0, 1852.0 / 3600.0),
+     ("N", "N", 3.0, 3.0), ("deg", "rad", 180.0, math.pi)],
+)  # fmt: skip
+def test_a_column_of_a_model_is_logged_in_any_unit_of_what_it_measures(unit, declared, logged, wanted):
+    column = of_a_model(unit, declared)["value"]
+    assert column.converted(np.array([logged]), None) == pytest.approx([wanted])
+
+
+@pytest.mark.parametrize(("unit", "declared"), [("%", "rad"), ("rpm", "rad/s"), ("m", "m/s"), ("m", "N m")])
+def test_one_in_a_unit_of_something_else_is_refused_by_name(unit, declared):
+    with pytest.raises(ConfigError, match=f"columns.value.unit: '{unit}' is no unit of"):
+        of_a_model(unit, declared)

@@ -204,9 +204,11 @@ class _Source:
         whole = round(1.0 / per_unit)
         t = (logged - logged[kept[0]]) / whole if whole else (logged - logged[kept[0]]) * per_unit
         if wrong.size and time.not_increasing == "refuse":
-            row = int(wrong[0])
-            before = float(t[kept[kept < row][-1]]) if (kept < row).any() else 0.0
-            what = "a missing time" if np.isnan(t[row]) else f"time does not go on: {t[row]:g} s after {before:g} s"
+            back = np.flatnonzero(np.diff(logged[good]) <= 0.0)
+            row, what = int(wrong[0]), "a missing time"
+            if back.size and not np.isnan(logged[row]):
+                before, row = (int(good[back[0] + ahead]) for ahead in (0, 1))
+                what = f"time does not go on: {t[row]:g} s after {t[before]:g} s"
             what += ' (time.not_increasing = "drop" leaves such rows out)'
             raise table.error(what, row=row, column=time.column)
         self._leave_out("whose time does not go on", wrong)

@@ -9,8 +9,8 @@ import json
 import os
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -30,7 +30,10 @@ from glider.tools.data.runs.csvfile import Dialect, write_bytes
 from glider.tools.data.sources import name_or_path, read_text
 
 # 'counts' is for values that `scale` alone turns into the target's SI unit.
-COLUMN_UNITS = units_of("length", "angle", "rate", "mass", "volume", "pressure", "counts")
+COLUMN_UNITS = units_of(
+    "length", "angle", "rate", "mass", "volume", "pressure", "speed", "acceleration", "frequency", "force", "share",
+    "counts",
+)  # fmt: skip
 TIME_TEXTS = ("iso8601", "clock")  # dates and times; times of day
 TIME_UNITS = {name: UNITS[name].factor for name in units_of("time")}
 _KINDS = (("_rad_s", "rate"), ("_rad", "angle"), ("_kg", "mass"), ("_m", "length"), (names.OIL, "volume"))
@@ -46,6 +49,7 @@ class Target:
     held: frozenset[str] = frozenset(names.COMMANDS)  # stay until they are given again
     angles: frozenset[str] = names.WRAPPING
     vehicle: Path | None = None  # file of a user's model
+    units: Mapping[str, str] = field(default_factory=dict)  # of its columns, as it declares them
 
 
 RUN_DATA = Target()
@@ -158,10 +162,13 @@ def check_columns(columns: Mapping[str, ConversionTable], source: str, target: T
                 source, f"no column of {whose} (put it in [extra], or use {known})", key=f"columns.{name}"
             )
         wanted = next((kind for ending, kind in _KINDS if name.endswith(ending)), "counts")
+        if name in target.units:
+            wanted = UNITS[target.units[name]].kind if target.units[name] in UNITS else "counts"
         kind = UNITS[column.unit].kind
         also = {"length": "pressure" if name == names.DEPTH else wanted, "mass": "volume"}.get(wanted, wanted)
         if kind not in (wanted, also, "counts"):
-            raise ConfigError(source, f"{column.unit!r} is no unit of {wanted}", key=f"columns.{name}.unit")
+            what = wanted if wanted != "counts" else f"what is declared in {target.units.get(name, 'counts')}"
+            raise ConfigError(source, f"{column.unit!r} is no unit of {what}", key=f"columns.{name}.unit")
 
 
 class AnyMap(Protocol):
@@ -265,13 +272,13 @@ def _with_column(error: ConfigError, text: str, source: str, by_name: Mapping[st
     return error
 
 
-def template(name: str, columns: Sequence[str] = (), vehicle: str = "") -> str:
+def template(name: str, units: Mapping[str, str] | None = None, vehicle: str = "") -> str:
     """A shipped mapping with every key, commented, to be filled in.
 
-    columns: those that the user's model in the file `vehicle` declares, instead of run data's.
+    units: of the columns that the user's model in the file `vehicle` declares, instead of run data's.
     """
     text = files("glider.tools.data.importers").joinpath(name).read_text(encoding="utf-8")
-    if not columns:
+    if units is None:
         return text
     head, _, rest = text.partition(f"[columns.{names.DEPTH}]\n")
     head = re.sub(r"(?m)^vehicle = .*\n( +#.*\n)?", f"vehicle = {json.dumps(vehicle)}\n", head)
@@ -280,10 +287,13 @@ def template(name: str, columns: Sequence[str] = (), vehicle: str = "") -> str:
     needed = [key for key in keys if key.startswith(("source", "topic", "field"))]
     optional = [key if key.startswith("#") else f"# {key}" for key in keys if key not in needed]
     tables = list[str]()
-    for column in columns:
+    for column, unit in units.items():
         lines = [re.sub(r'(source|topic) = "[^"]*"', rf'\1 = "{column}"', key) for key in needed]
+        known = [f'# unit = "{unit}"'] if unit in COLUMN_UNITS else []
         if tables:
-            lines, optional = [line.partition("  #")[0].rstrip() for line in lines], []
+            lines, optional = [line.partition("  #")[0].rstrip() for line in lines], known
+        elif known:
+            optional = [re.sub(r'^# unit = "[^"]*"', known[0], key) for key in optional]
         tables.append("\n".join([f"[columns.{column}]", *lines, *optional]))
     return head + "\n\n".join([*tables, rest[rest.index("# [extra.") :]])
 

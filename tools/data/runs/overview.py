@@ -8,8 +8,8 @@ import numpy as np
 from glider.tools.data.runs import columns as names
 from glider.tools.data.runs.run import Run
 
-UNITS = (("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_kg_m3", "kg/m3"), ("_rad", "rad"), ("_kg", "kg"), ("_m3", "m3"),
-         ("_m", "m"), ("_s", "s"), ("_c", "deg C"))  # fmt: skip
+UNITS = (("_rad_s", "rad/s"), ("_m_s2", "m/s2"), ("_m_s", "m/s"), ("_1_s", "1/s"), ("_kg_m3", "kg/m3"),
+         ("_rad", "rad"), ("_kg", "kg"), ("_m3", "m3"), ("_m", "m"), ("_s", "s"), ("_c", "deg C"))  # fmt: skip
 
 
 @dataclass(frozen=True)
