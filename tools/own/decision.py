@@ -114,6 +114,12 @@ class Hypothesis:
     strange: float = 0.0  # probability that more is left than it says
     found: list[Expansion] = field(default_factory=list)
     everywhere: bool = False  # whether runs are expanded in all columns there, with their derivatives
+    off: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (labels,) of sizes, what the vehicle's own are off
+
+    @property
+    def changes(self) -> np.ndarray:
+        """Sizes (labels,) beside what the vehicle's own numbers are off: what changed."""
+        return self.sizes - self.off if len(self.off) else self.sizes
 
     def forget(self) -> None:
         """Nothing begins here any more: the derivatives, most of what is kept, go."""

@@ -147,7 +147,7 @@ def _sizes(found: Posterior, effects) -> dict[str, dict[str, Any]]:
     """Each label's size with its 90 % interval, by the most probable hypothesis that has it."""
     sizes: dict[str, dict[str, Any]] = {}
     for one in sorted(found.hypotheses, key=lambda one: -one.evidence):
-        for label, size, sd in zip(one.labels, one.sizes, one.sd, strict=True):
+        for label, size, sd in zip(one.labels, one.changes, one.sd, strict=True):
             if label not in sizes:
                 effect = effects[label]
                 sizes[label] = {"estimate": float(size * effect.spread), "ci90": interval(effect, size, sd),
@@ -159,7 +159,7 @@ def _gaps(observer: Observer, healthy: Healthy, chosen: Hypothesis, selected: Se
     """Gaps of the case's runs before, recalibrated, after and floor; the corrected vehicle's numbers."""
     names = [one.name for one in observer.declared.outputs]
     nothing = next(one for one in found.hypotheses if not one.labels)
-    size = dict(zip(chosen.labels, chosen.sizes, strict=True))
+    size = dict(zip(chosen.labels, chosen.changes, strict=True))
     changed = effect_point(observer, healthy, selected, np.array([size[label] for label in selected]))
     recalibrated = effect_point(observer, healthy, [one.label for one in healthy.effects], nothing.shared)
     tables = {}

@@ -62,16 +62,16 @@ def _noisy(
     table = []
     for size in SIZES:
         noisy = windows.marginalised(runs, size / windows.reach, engine.level.of)
-        _, _, evidence, mean, sd = engine.best_sizes(noisy, places, begin.shared)
-        table.append((evidence, mean, sd))
+        _, _, evidence, mean, sd, off = engine.best_sizes(noisy, places, begin.shared)
+        table.append((evidence, mean, sd, off))
     evidence = float(logsumexp([row[0] for row in table]) - np.log(len(SIZES)))
     evidence -= windows.windows * engine.healthy.noise_gain.get(label, 0.0)
-    _, mean, sd = max(table, key=lambda row: row[0])
+    _, mean, sd, off = max(table, key=lambda row: row[0])
     size, error = windows.size(SIZES[-1])
     engine.reach[engine.healthy.at([label])] = windows.reach
     evidence += log_prior(engine.healthy, labels)
     found = replace(begin, labels=labels, evidence=evidence, sizes=np.append(mean, size),
-                    sd=np.append(sd, error), left=windows.left(size))  # fmt: skip
+                    sd=np.append(sd, error), left=windows.left(size), off=np.append(off, 0.0))  # fmt: skip
     found.strange = strangeness(engine.healthy, found, nothing)
     gain, left = found.evidence - nothing.evidence, np.sqrt(found.left.mean())
     engine.say(f"{' + '.join(labels)}: {gain:.1f} nat, {left:.2f} left")

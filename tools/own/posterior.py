@@ -138,7 +138,7 @@ class Engine:
                 way = np.abs([here.shared - last.shared, *(here.own - last.own)]) / rooms
                 here, longest = last, SHORTER_WAY * min(longest, float(way.max()))
             last, shared, own, found = here, here.shared, here.own, here.found
-            by, pooled, evidence, sizes, sd = self.best_sizes(found, places, shared)
+            by, pooled, evidence, _, sd, off = self.best_sizes(found, places, shared)
             values = replace(pooled, V=by.V).mean()
             led = np.array([run_values(one, values, by.scatter) for one in found])
             predicted_gain = sum(one.value - one.at_place(x) for one, x in zip(found, led, strict=True))
@@ -161,7 +161,7 @@ class Engine:
         left = np.array([one.squares.sum() / max(1, one.samples.sum()) for one in found])
         evidence += odds
         self.ahead = max(self.ahead, evidence)
-        fitted = Hypothesis(labels, evidence, sizes, sd, shared, own, left, 0.0, found, everywhere=True)
+        fitted = Hypothesis(labels, evidence, shared[places], sd, shared, own, left, 0.0, found, True, off)
         if not every:
             fitted.forget()
         return fitted
@@ -204,9 +204,9 @@ class Engine:
 
     def best_sizes(
         self, found: Sequence[Expansion], places: Sequence[int], shared: np.ndarray
-    ) -> tuple[Deviations, Pooled, float, np.ndarray, np.ndarray]:
+    ) -> tuple[Deviations, Pooled, float, np.ndarray, np.ndarray, np.ndarray]:
         """Deviations with the most probable prior without form errors, runs pooled with the most probable of all, log
-        evidence over all, sizes with their sd.
+        evidence over all, sizes with their sd, and what of them the vehicle's own numbers are off.
 
         Priors of the grid differ in a few variances, d: with W = (1 + V H)^-1, Q = (H W) and q = W' r at these,
         they add to the evidence what `under_priors` says (Woodbury).
@@ -229,25 +229,17 @@ class Engine:
             variance = np.diag(M)[places] + np.einsum("pa,nab,pb->np", G, S, G)
             sd = np.sqrt(np.maximum(variance, 1e-30))
             halves = (np.log(2.0) + norm.logcdf(mean / sd))[:, sided].sum(axis=1)
-            table.append((prior + pooled.log_evidence() + gained + halves, by, pooled))
+            table.append((prior + pooled.log_evidence() + gained + halves, mean, sd, by, pooled))
         evidence = float(logsumexp([row[0] for row in table]) - np.log(2 * len(grid)))
-        nat, by, pooled = max(table, key=lambda row: row[0].max())
+        nat, mean, sd, by, pooled = max(table, key=lambda row: row[0].max())
         best = int(np.argmax(nat))
         *sizes, form = grid[best]
         at = replace(pooled, V=self.variance(by.V, places, sizes, shared, form))
-        label, sd = self.changes(at, places, (np.array(sizes) / np.maximum(self.reach[places], LEAST_REACH)) ** 2)
         *sizes, form = grid[max((n for n, one in enumerate(grid) if not one[-1]), key=lambda n: nat[n])]
         led = replace(by, V=self.variance(by.V, places, sizes, shared, form))
-        return led, at, evidence, label, sd
-
-    def changes(self, at: Pooled, places: Sequence[int], tau2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sizes of labels beside what the vehicle's own numbers are off, of prior variances tau2, and their sd: with
-        x = s + c pooled, c is tau2 (r - H x) where x is most probable."""
-        S = at.covariance()
-        slope = (at.r - at.H @ (S @ at.r))[places]
-        seen = np.diag(at.H)[places] - np.einsum("pi,ij,jp->p", at.H[places], S, at.H[:, places])
-        variance = np.maximum(tau2 - tau2**2 * seen, 1e-30)
-        return np.clip(tau2 * slope, self.low[places], self.high[places]), np.sqrt(variance)
+        # with x = s + c pooled, s is V (r - H x) where x is most probable, and c the change
+        off = by.V[places] @ (at.r - at.H @ at.mean())
+        return led, at, evidence, np.clip(mean[best], self.low[places], self.high[places]), sd[best], off
 
     def label_gains(self, slope: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Log evidence (k,) that each label gains by its parabola, beside what is integrated out, and its size there.

@@ -119,7 +119,7 @@ def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
     random = np.random.default_rng(3)
     asked = engine(4, V=np.diag([0.1, 0.0, 0.0]), scatter=by_itself(0.3))
     runs, shared = [run_at(random.normal(size=3), 0.3) for _ in range(4)], random.normal(size=3)
-    by, at, evidence, mean, sd = asked.best_sizes(runs, places, shared)
+    by, at, evidence, mean, sd, off = asked.best_sizes(runs, places, shared)
     nat, chosen = [], []
     for each, prior in asked.deviations:
         for *sizes, form in itertools.product(*[SIZES.tolist()] * len(places), FORM_SHARES):
@@ -128,13 +128,14 @@ def test_the_grid_of_sizes_is_what_each_prior_alone_gives(places):
             chosen.append(sizes)
     assert evidence == pytest.approx(logsumexp(nat) - np.log(2 * len(SIZES) ** len(places) * len(FORM_SHARES)))
     assert at.log_evidence() + max(prior for _, prior in asked.deviations) == pytest.approx(max(nat))
+    assert mean == pytest.approx(at.mean()[places])
+    assert sd**2 == pytest.approx(np.diag(at.covariance())[places])
     # the numbers of the vehicle and what labels add to them, one behind the other
     tau2 = np.array(chosen[int(np.argmax(nat))]) ** 2
     both = np.hstack([np.eye(3), np.eye(3)[:, places]])
     prior = np.diag(np.append(np.diag(at.V) - np.eye(3)[:, places] @ tau2, tau2))
     covariance = np.linalg.inv(np.eye(len(prior)) + prior @ both.T @ at.H @ both) @ prior
-    assert mean == pytest.approx((covariance @ both.T @ at.r)[3:])
-    assert sd**2 == pytest.approx(np.diag(covariance)[3:])
+    assert mean - off == pytest.approx((covariance @ both.T @ at.r)[3:])
     # what it is led by: the most probable sizes of labels that are as they have it
     each, _ = next(one for one in asked.deviations if one[0].scatter is by.scatter)
     plain = [asked.variance(each.V, places, sizes, shared, 0.0)
