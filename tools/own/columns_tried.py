@@ -17,6 +17,7 @@ from glider.tools.own.load import LoadedVehicle
 from glider.tools.own.observer import Observer
 from glider.tools.own.observers import thinned
 from glider.tools.own.runs import OwnRun
+from glider.tools.own.steps import MOST_PARTS
 
 DEGREE = np.pi / 180.0
 TIMES: dict[str, tuple[float, ...]] = dict.fromkeys(("rad", "rad/s"), (DEGREE, 1.0 / DEGREE))
@@ -27,7 +28,6 @@ TRIED_RUNS = 3
 BETTER = 2.0  # nat, product of channels' errors, that every run gains
 MOST_ERROR = 1.0  # logarithm, in spreads of what is read: a flight that is farther off is lost
 NO_LIMIT = 1e9  # times a tolerance
-MOST_PARTS = 16
 
 
 @dataclass(frozen=True)

@@ -189,7 +189,6 @@ def identify(
     between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
     covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
-    logs = level_logs(found, errors)
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     after = fit.held_out(every, others)
     labels, usual_of_labels = usual_labels(replace(fit, scatter=scatter), others, eta)
@@ -197,7 +196,7 @@ def identify(
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
     return Identified(vehicle, observer, nuisance, values, covariance, scatter, labels, usual_of_labels, eta, between,
-                      errors, components, own, before, after, level_scatter(logs), counts,
+                      errors, components, own, before, after, level_scatter(level_logs(found, errors)), counts,
                       session_scatter, operating_scatter, noise_gain, [one.label for one in added], notes)  # fmt: skip
 
 

@@ -32,7 +32,7 @@ DAMPINGS = 8  # tried at most, from the least on that keeps steps short
 UNSEEN = 1e-3  # curvature that is damped where runs say nothing
 CONVERGED_GAIN = 0.5  # of -2 log posterior: no further round
 CONVERGED_SCALE = 0.05  # e-folds of what is left, by which it changes no more
-USUAL_LEVEL_SCATTER, TINY = 0.5, 1e-300  # of one run; of a square: none
+TINY = 1e-300  # of a square: none
 LEAST_SCALE = 0.02  # tolerances: less than that no channel is known to be left with
 
 
@@ -141,7 +141,7 @@ def level_logs(found: Sequence[Expansion], errors: ChannelErrors) -> np.ndarray:
 
 def level_scatter(logs: np.ndarray) -> float:
     """1 sigma from run to run of `level_logs`."""
-    return float(logs.std(ddof=1)) if len(logs) > 1 else USUAL_LEVEL_SCATTER
+    return float(logs.std(ddof=1)) if len(logs) > 1 else HEALTHY.run_scale
 
 
 def weather_scatter(logs: np.ndarray, counts: np.ndarray) -> float:

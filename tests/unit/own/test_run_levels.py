@@ -1,6 +1,5 @@
 """A rough day among calm ones: it counts for as little as it says, and calm runs are held against calm ones."""
 
-import numpy as np
 import pytest
 
 from glider.tools.own.check import load_own
@@ -9,45 +8,21 @@ from glider.tools.own.identified import VEHICLE, write
 from glider.tools.own.identified import plain as identified_plain
 from glider.tools.own.identify import identify
 from glider.tools.own.runs import OwnRun
-from tests.support.own_vehicle import flown, module_of
+from tests.support.turner import TRUE, turned, written
 
-TRUE = np.array([0.4, 1.2])  # damping, push
-MODEL = """
-import numpy as np
-inputs = {"motor": "1"}
-outputs = [
-    {"name": "heading", "unit": "rad", "noise": 0.003, "tolerance": 0.03},
-    {"name": "rate", "unit": "rad/s", "column": "r_rad_s", "noise": 0.003, "tolerance": 0.03},
-]
-parameters = [("damping", "1", 0.5, 0.2), ("push", "1", 1.0, 0.3)]
-states = [("psi", "rad"), ("r", "rad/s")]
-noises = [("moment", "rad/s2", 0.01)]
-def derivative(x, u, w, theta):
-    return np.array([x[1], theta[1] * u[0] - theta[0] * x[1] + w[0]])
-def measure(x, u, theta):
-    return np.array([x[0], x[1]])
-"""
 ROUGH = 6.0  # times the disturbances of a calm day
 
 
-def day(model, seed: int, rough: float, count: int = 4, push: float = 1.0) -> list[OwnRun]:
-    """Runs of a minute each under steps of the motor."""
-    rng, found = np.random.default_rng(seed), []
-    for k in range(count):
-        t = 0.1 * np.arange(601)
-        u = np.repeat(rng.uniform(-0.5, 0.5, 21), 30)[:601, None]
-        outputs = flown(model, TRUE * [1.0, push], t, u, np.zeros(2), rng, rough)
-        found.append(OwnRun(f"run{k}", t, u, outputs + 0.003 * rng.normal(size=outputs.shape)))
-    return found
+def day(model, seed: int, rough: float, push: float = 1.0) -> list[OwnRun]:
+    """Four runs of a day."""
+    return turned(model, seed, count=4, push=push * TRUE["push"], rough=rough)
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """The folder, the model, and what a calm, a rough and a calm day identify."""
     folder = tmp_path_factory.mktemp("days")
-    (folder / "turner.py").write_text(MODEL)
-    (folder / "turner.toml").write_text('format = 1\nmodel = "turner"\n')
-    model = module_of(folder / "turner.py")
+    model = written(folder)
     sessions = [day(model, 1, 1.0), day(model, 2, ROUGH), day(model, 3, 1.0)]
     found = identify(load_own(folder / "turner.toml"), sessions)
     write(found, folder / "identified")
@@ -57,7 +32,7 @@ def made(tmp_path_factory):
 def test_numbers_are_those_of_the_calm_days(made):
     folder, model, found = made
     alone = identify(load_own(folder / "turner.toml"), [day(model, 1, 1.0), day(model, 3, 1.0)])
-    for k, (name, value) in enumerate(zip(("damping", "push"), TRUE, strict=True)):
+    for k, (name, value) in enumerate(TRUE.items()):
         one = next(row for row in identified_plain(found)["parameters"] if row["name"] == name)
         assert one["mean"] == pytest.approx(value, abs=max(3.0 * one["sd"], 0.01 * value))
         assert found.covariance[k, k] < 2.0**2 * alone.covariance[k, k]

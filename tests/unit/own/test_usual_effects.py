@@ -1,6 +1,5 @@
 """What the model lacks in every run, an identified vehicle has; a change is what differs from that."""
 
-import numpy as np
 import pytest
 
 from glider.tools.own import usual_effects
@@ -8,48 +7,16 @@ from glider.tools.own.check import load_own
 from glider.tools.own.diagnose import diagnose_own
 from glider.tools.own.identified import plain, write
 from glider.tools.own.identify import identify
-from glider.tools.own.runs import OwnRun
-from tests.support.own_vehicle import flown, module_of
+from tests.support.own_vehicle import module_of
+from tests.support.turner import FILE, TRUE, turned, written
 
-FILE = {"damping": (0.5, 0.2), "push": (1.0, 0.3)}
-TRUE = {"damping": 0.4, "push": 1.2}
-MODEL = f"""
-import numpy as np
-inputs = {{"motor": "1"}}
-outputs = [
-    {{"name": "heading", "unit": "rad", "noise": 0.003, "tolerance": 0.03}},
-    {{"name": "rate", "unit": "rad/s", "column": "r_rad_s", "noise": 0.003, "tolerance": 0.03}},
-]
-parameters = [(name, "1", *known) for name, known in {FILE}.items()]
-states = [("psi", "rad"), ("r", "rad/s")]
-noises = [("moment", "rad/s2", 0.01)]
-def derivative(x, u, w, theta):
-    return np.array([x[1], theta[1] * u[0] - theta[0] * x[1] + w[0]])
-def measure(x, u, theta):
-    return np.array([x[0], x[1]])
-"""
 LAG = 0.6  # s: of the vehicle's motor
-
-
-def runs(model, seed: int, lag: float, count: int = 6, damping: float = TRUE["damping"]) -> list[OwnRun]:
-    """One minute each under steps of the motor, which the vehicle follows with a lag."""
-    rng, found = np.random.default_rng(seed), []
-    for k in range(count):
-        t = 0.1 * np.arange(601)
-        asked = np.repeat(rng.uniform(-0.5, 0.5, 21), 30)[:601, None]
-        follows = asked.copy()
-        for row in range(1, len(t) if lag else 0):
-            follows[row] = follows[row - 1] + (asked[row - 1] - follows[row - 1]) * -np.expm1(-0.1 / lag)
-        outputs = flown(model, np.array([damping, TRUE["push"]]), t, follows, np.zeros(2), rng, 1.0)
-        found.append(OwnRun(f"run{k}", t, asked, outputs + 0.003 * rng.normal(size=outputs.shape), None))
-    return found
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("late")
-    (folder / "turner.py").write_text(MODEL)
-    (folder / "turner.toml").write_text('format = 1\nmodel = "turner"\n')
+    written(folder)
     return folder
 
 
@@ -57,7 +24,7 @@ def folder(tmp_path_factory):
 def late(folder):
     """A vehicle whose motor is late, identified by a model whose is not."""
     said: list[str] = []
-    found = identify(load_own(folder / "turner.toml"), [runs(module_of(folder / "turner.py"), 3, LAG)], said.append)
+    found = identify(load_own(folder / "turner.toml"), [turned(module_of(folder / "turner.py"), 3, LAG)], said.append)
     write(found, folder / "late")
     return found, said
 
@@ -79,7 +46,7 @@ def test_written_and_read_it_flies_and_asks_beside_that(late, folder):
     model = module_of(folder / "turner.py")
 
     def asked(seed: int, lag: float, damping: float = TRUE["damping"]) -> dict[str, float]:
-        posterior, _ = diagnose_own(vehicle, runs(model, seed, lag, 3, damping))
+        posterior, _ = diagnose_own(vehicle, turned(model, seed, lag, 3, damping))
         return posterior.chances
 
     assert asked(11, LAG)["none"] > 0.5
@@ -88,7 +55,7 @@ def test_written_and_read_it_flies_and_asks_beside_that(late, folder):
 
 
 def test_a_vehicle_as_the_model_has_it_has_none(folder):
-    found = identify(load_own(folder / "turner.toml"), [runs(module_of(folder / "turner.py"), 4, 0.0)])
+    found = identify(load_own(folder / "turner.toml"), [turned(module_of(folder / "turner.py"), 4, 0.0)])
     assert found.effects == []
 
 
@@ -96,7 +63,7 @@ def test_what_is_not_taken_into_the_vehicle_is_usual_all_the_same(folder, monkey
     """No label joins the vehicle here: three runs of its motor, late as ever, are no change; another damping is one."""
     monkeypatch.setattr(usual_effects, "MOST_EFFECTS", 0)
     model = module_of(folder / "turner.py")
-    found = identify(load_own(folder / "turner.toml"), [runs(model, 3, LAG)])
+    found = identify(load_own(folder / "turner.toml"), [turned(model, 3, LAG)])
     assert found.effects == []
     write(found, folder / "without")
     vehicle = load_own(folder / "without" / "identified.toml")
@@ -104,5 +71,5 @@ def test_what_is_not_taken_into_the_vehicle_is_usual_all_the_same(folder, monkey
     assert table is not None
     assert table.label_mean["motor_lag"] == pytest.approx(LAG, abs=0.2)
     for seed, damping, cause in ((11, TRUE["damping"], "none"), (14, TRUE["damping"], "none"), (12, 0.7, "damping")):
-        chances = diagnose_own(vehicle, runs(model, seed, LAG, 3, damping))[0].chances
+        chances = diagnose_own(vehicle, turned(model, seed, LAG, 3, damping))[0].chances
         assert chances[cause] > 0.5, chances
