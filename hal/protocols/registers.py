@@ -23,8 +23,8 @@ INTEGERS = [kind for kind in CODES if kind != "f32"]
 Kind = Literal["u16", "i16", "u32", "i32", "f32"]
 Role = Literal["pressure", "analog", "encoder", "drive"]
 RAMP = "ms per 1000 rpm"
-# What the driver of a role reads and writes, by block and name, and the units that it may stand in: those of a kind are
-# turned into SI; others are what the driver itself works in.
+OWN_UNITS = ("1", "counts", "rpm", RAMP)  # what the drivers themselves work in: never turned into SI
+# What the driver of a role reads and writes, by block and name, and the units that it may stand in.
 NEEDED: dict[Role, dict[str, dict[str, list[str]]]] = {
     "pressure": {"all": {"pressure": units_of("pressure")}},
     "analog": {"all": {"channel": ["1"]}},
@@ -97,7 +97,7 @@ class RegisterMap(Table):
                     raise ValueError(f"block.{block}.value.{name}: missing, role '{self.role}' needs it")
         for block, table in self.block.items():
             for name, value in table.value.items():
-                allowed = NEEDED[self.role].get(block, {}).get(name) or ALLOWED.get(name) or [*UNITS, "1"]
+                allowed = NEEDED[self.role].get(block, {}).get(name) or ALLOWED.get(name) or list(UNITS)
                 if value.unit not in allowed:
                     expected = ", ".join(allowed)
                     raise ValueError(f"block.{block}.value.{name}.unit: expected {expected}, got {value.unit!r}")
@@ -192,8 +192,8 @@ def from_registers(kind: str, registers: list[int], at: int = 0) -> float:
 
 
 def step_of(value: Value) -> float:
-    """What a step of a register's number is worth, SI (deg C for temperatures)."""
-    return value.scale * (UNITS[value.unit].factor if value.unit in UNITS else 1.0)
+    """What a step of a register's number is worth, SI (deg C for temperatures) or one of `OWN_UNITS`."""
+    return value.scale * (1.0 if value.unit in OWN_UNITS else UNITS[value.unit].factor)
 
 
 def value_of(block: Block, name: str, registers: list[int]) -> float:

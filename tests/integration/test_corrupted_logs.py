@@ -195,7 +195,7 @@ def test_a_rate_that_the_rows_contradict_is_refused(tmp_path, flights):
 
 def test_doubled_rows_are_refused_with_the_key_that_drops_them(tmp_path, flights):
     twice = [{name: np.repeat(values, 2) for name, values in flight.items()} for flight in flights]
-    with pytest.raises(InputError, match=r"flight0\.csv:2: millis: .*not_increasing = \"drop\""):
+    with pytest.raises(InputError, match=r"flight0\.csv:3: millis: .*not_increasing = \"drop\""):
         imported(tmp_path, twice)
 
 
