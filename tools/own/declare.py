@@ -202,10 +202,16 @@ def _entries(given: Any, kind: type[Entry], what: str) -> tuple[Entry, ...]:
     return tuple(found)
 
 
+def is_black_box(model: Any) -> bool:
+    """Whether a model flies whole windows alone: a step or a derivative without measure is a helper of its own."""
+    steps = hasattr(model, "step") or hasattr(model, "derivative")
+    return hasattr(model, "rollout") and not (steps and hasattr(model, "measure"))
+
+
 def declaration(model: Any) -> Declaration:
     """The lists of a model object; DeclarationError where one is missing or cannot be read."""
     lists: dict[str, Any] = {}
-    black_box = hasattr(model, "rollout") and not hasattr(model, "step") and not hasattr(model, "derivative")
+    black_box = is_black_box(model)
     for what, kind in (("inputs", Input), ("outputs", Output), ("parameters", Parameter), ("states", State),
                        ("noises", Noise)):  # fmt: skip
         given = getattr(model, what, None)

@@ -3,6 +3,7 @@
 Errors of the user's file name that file and its line.
 """
 
+import hashlib
 import importlib
 import traceback
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from glider.hal.strict import ConfigError, locate
 from glider.tools.data.errors import InputError
 from glider.tools.data.sources import read_text
 from glider.tools.own.compiled import Kernels, kernels_of
-from glider.tools.own.declare import QUATERNION, Declaration, DeclarationError, declaration
+from glider.tools.own.declare import QUATERNION, Declaration, DeclarationError, declaration, is_black_box
 from glider.tools.own.files import OwnVehicle, declared_with, decode_own
 from glider.tools.own.kernel_processes import side_by_side
 from glider.tools.own.neighbours import import_file, neighbours
@@ -90,12 +91,12 @@ def read_own(path: Path) -> LoadedVehicle:
     except (TypeError, ValueError) as error:
         raise user_error(error, source, "the declaration") from None
     declared = declared_with(declared, given, text, path)
-    steps = hasattr(model, "step") or hasattr(model, "derivative")
-    if not steps and not hasattr(model, "rollout"):
+    black_box = is_black_box(model)
+    if not black_box and not hasattr(model, "step") and not hasattr(model, "derivative"):
         raise InputError("the model has none of step, derivative, rollout", source=source or path)
-    if steps and not hasattr(model, "measure"):
+    if not black_box and not hasattr(model, "measure"):
         raise InputError("the model has no measure(x, u, theta)", source=source or path)
-    return LoadedVehicle(path, text, given, model, source, attribute, declared, 1 if steps else 0)
+    return LoadedVehicle(path, text, given, model, source, attribute, declared, 0 if black_box else 1)
 
 
 def _import(wanted: str, folder: Path, wrong: Callable[[str], ConfigError]) -> tuple[Any, Path | None, str]:
@@ -122,7 +123,8 @@ def _import(wanted: str, folder: Path, wrong: Callable[[str], ConfigError]) -> t
     file = folder.resolve() / f"{module_name}.py"
     try:
         if file.is_file():
-            name = f"glider_own_given_{abs(hash(str(file)))}"
+            # the same in every process: what Numba keeps of the user's own compiled functions names their module
+            name = f"glider_own_given_{hashlib.sha256(str(file).encode()).hexdigest()[:16]}"
             module, _ = import_file(name, file, folder)
         else:
             module = importlib.import_module(module_name)

@@ -303,3 +303,11 @@ def test_numbers_of_the_file_stand_in_for_the_models(vehicle):
     ).declared
     assert (declared.parameters[0].value, declared.parameters[0].scope, declared.noises[0].density) == (6.0, "run", 0.5)
     assert np.isinf(declared.parameters[0].high)
+
+
+def test_a_rollout_with_a_derivative_of_its_own_and_no_measure_is_a_black_box():
+    model = {"inputs": {"fin": "rad"}, "outputs": {"roll": "rad"}, "parameters": [], "derivative": lambda x, u: x,
+             "rollout": lambda x0, t, u, theta: None}  # fmt: skip
+    assert declaration(SimpleNamespace(**model)).states == ()
+    with pytest.raises(DeclarationError, match="states: not declared"):
+        declaration(SimpleNamespace(**model, measure=lambda x, u, theta: x))

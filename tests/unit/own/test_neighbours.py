@@ -1,6 +1,7 @@
 """A model in more than one file: compiled, seen to change, taken along with what is written elsewhere."""
 
 import json
+import subprocess
 import sys
 import textwrap
 
@@ -129,3 +130,14 @@ def test_all_of_it_is_taken_along_where_a_vehicle_is_written(boat, healthy, tmp_
     assert asked.returncode == 0, asked.stderr
     again = glider("gap", "measure", healthy, "--vehicle", "said/corrected.toml", "--json", cwd=elsewhere)
     assert again.returncode == 0, again.stderr
+
+
+def test_functions_that_the_user_compiled_and_keeps_are_found_by_a_later_process(boat):
+    """Numba's cache names the module that they are of."""
+    twice = "@numba.njit(cache=True)\ndef twice(x):\n    return 2.0 * x\ndef derivative"
+    text = (boat / "boat.py").read_text().replace("def derivative", twice).replace("units.MASS", "twice(units.MASS)")
+    (boat / "boat.py").write_text("import numba\n" + text)
+    for _ in range(2):
+        words = [sys.executable, "-m", "glider.tools.cli.main", "vehicle", "check", "boat.toml"]
+        done = subprocess.run(words, cwd=boat, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
