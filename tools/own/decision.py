@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import logsumexp
 
 from glider.tools.inference.healthy_level import HealthyLevel
@@ -18,6 +19,7 @@ from glider.tools.own.excess_noise import NOISE_SIZES
 from glider.tools.own.hierarchy import LEAST_REACH, ChannelErrors, Expansion
 
 NONE, UNKNOWN = "none", "unknown"
+WIDTHS = 1e-9, 1e3  # of a parabola that gains what its label does: variances over the squared size, from and to
 SIZES = NOISE_SIZES  # tolerances, rms over the windows
 # prior odds of a label to one of an input or an output: what is fixed of a vehicle changes less often than what is
 # commanded and read; a force that no label has, seldom
@@ -35,18 +37,27 @@ class UsualLabels:
     """What healthy runs show of every label alone, beside what they differ by, in spreads (labels,)."""
 
     scatter: np.ndarray  # 1 sigma from run to run
+    session: np.ndarray  # 1 sigma from session to session, beside it
     mean: np.ndarray  # of all runs
     error: np.ndarray  # 1 sigma of that
 
-    def of_runs(self, k: int, runs: int, session_share: float, within: bool = False) -> tuple[float, float]:
-        """Mean and variance of label k over some runs of a session; session_share: `Healthy`'s; within: off what the
-        session's other runs have of it."""
-        mean, variance = (0.0, 0.0) if within else self.of_session(k, session_share)
+    def of_runs(self, k: int, runs: int, within: bool = False) -> tuple[float, float]:
+        """Mean and variance of label k over some runs of a session; within: off what the session's other runs have of
+        it."""
+        mean, variance = (0.0, 0.0) if within else self.of_session(k)
         return mean, variance + float(self.scatter[k] ** 2) / runs
 
-    def of_session(self, k: int, session_share: float) -> tuple[float, float]:
+    def of_session(self, k: int) -> tuple[float, float]:
         """Mean and variance of what a session's runs have of label k in common."""
-        return float(self.mean[k]), float(self.error[k] ** 2 + self.scatter[k] ** 2 * session_share)
+        return float(self.mean[k]), float(self.error[k] ** 2 + self.session[k] ** 2)
+
+
+def session_share(scatter: Scatter, session: Scatter, effects: Sequence[Effect]) -> float:
+    """Variance between sessions over that from run to run, of all effects that differ (geometric mean) but instruments:
+    how their biases do, the vehicle file says."""
+    runs, sessions = scatter.sizes, session.sizes
+    differs = (runs > 0.0) & (sessions > 0.0) & [one.family != OUTPUT for one in effects]
+    return float(np.exp(2.0 * np.log(sessions[differs] / runs[differs]).mean())) if differs.any() else 0.0
 
 
 @dataclass(frozen=True)
@@ -65,14 +76,6 @@ class Healthy:
     noise_gain: Mapping[str, float] = field(default_factory=dict)  # nat a window, of healthy runs; none: not weighed
     run_inflation: float = 1.0  # of the variance of shared values by the likelihood of runs
     sessions: int = 1  # of these runs
-
-    @property
-    def session_share(self) -> float:
-        """Variance between sessions over that from run to run, of all that differs (geometric mean) but instruments:
-        how their biases do, the vehicle file says."""
-        runs, sessions = self.scatter.sizes, self.session.sizes
-        differs = (runs > 0.0) & (sessions > 0.0) & [one.family != OUTPUT for one in self.effects]
-        return float(np.exp(2.0 * np.log(sessions[differs] / runs[differs]).mean())) if differs.any() else 0.0
 
     def at(self, labels: Sequence[str]) -> list[int]:
         known = [one.label for one in self.effects]
@@ -115,6 +118,7 @@ class Hypothesis:
     found: list[Expansion] = field(default_factory=list)
     everywhere: bool = False  # whether runs are expanded in all columns there, with their derivatives
     off: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (labels,) of sizes, what the vehicle's own are off
+    usual: float = 0.0  # nat that a usual deviation of one label more brings, by its parabola
 
     @property
     def changes(self) -> np.ndarray:
@@ -165,12 +169,12 @@ def usual_share(
     within: bool = False,
 ) -> float:  # fmt: skip
     """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it, and the form of
-    effects beside it, bring too, by a parabola; one that gains no more than `gain` nat, which is what the label does.
+    effects beside it, bring too, by a parabola: one that gains `gain` nat, which is what the label does.
 
     reach: tolerances that a spread of it moves the channels; moved: mean square that those effects move them by;
     within: what other runs of the session have in common of the label is no part of its size.
     """
-    mean, usual = healthy.usual.of_runs(k, runs, healthy.session_share, within)
+    mean, usual = healthy.usual.of_runs(k, runs, within)
     usual += form_variance(healthy, reach, moved)
 
     def odds(mean: float, scatter: float, variance: float) -> float:
@@ -179,7 +183,11 @@ def usual_share(
         change = logsumexp(-0.5 * (beyond / wide + np.log(wide))) - np.log(len(SIZES))
         return float(change + 0.5 * (beyond / narrow + np.log(narrow)))
 
-    variance = sd**2 * max(1.0, odds(0.0, 0.0, sd**2) / max(gain, 1e-9))
+    if gain <= 0.0 or size == 0.0:
+        return 0.0
+    variance, ends = sd**2, np.log(size**2 * np.array(WIDTHS))
+    if odds(0.0, 0.0, float(np.exp(ends[0]))) > gain:
+        variance = float(np.exp(brentq(lambda log: odds(0.0, 0.0, float(np.exp(log))) - gain, *ends, rtol=1e-6)))
     return max(0.0, odds(0.0, 0.0, variance) - odds(mean, usual, variance))
 
 
@@ -193,7 +201,7 @@ def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray,
     gained = dict[frozenset[str], float]()
     for one in sorted(every, key=lambda one: one.evidence):  # labels that were fitted twice: the better fit
         gained[frozenset(one.labels)] = one.evidence - log_prior(healthy, one.labels)
-    most, by_form = dict.fromkeys(gained, 0.0), dict.fromkeys(gained, 0.0)
+    most, by_form = {frozenset(one.labels): one.usual for one in every}, dict.fromkeys(gained, 0.0)
     for one in sorted(every, key=lambda one: -len(one.labels)):  # of one with a label more it is known what that has
         own = frozenset(one.labels)
         moves = (one.sizes * reach[healthy.at(one.labels)]) ** 2

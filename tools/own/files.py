@@ -81,6 +81,7 @@ class IdentifiedTable(Table):
     label_mean: dict[str, float] = msgspec.field(default_factory=dict)  # what all runs show of each label alone
     label_mean_error: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # 1 sigma of that
     label_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of each label alone, beside that
+    label_session_scatter: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # between sessions, beside that
     # NOISE_by_INPUT: force a unit of the input; NOISE_at_POINT: force (operating_points.py)
     form: dict[str, float] = msgspec.field(default_factory=dict)
     input_shares: dict[str, NonNegative] = msgspec.field(default_factory=dict)  # of the distance between points

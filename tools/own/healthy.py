@@ -6,7 +6,7 @@ import numpy as np
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Scatter
-from glider.tools.own.decision import Healthy, UsualLabels
+from glider.tools.own.decision import Healthy, UsualLabels, session_share
 from glider.tools.own.declare import RUN
 from glider.tools.own.effects import (
     NOISE,
@@ -37,7 +37,7 @@ def healthy_of(observer: Observer) -> Healthy:
     k = len(effects)
     # noise of healthy runs is taken from the evidence of more by itself (`noise_gain`)
     usual_scatter = np.array([0.0 if one.family == NOISE else USUAL_SCATTER for one in effects])
-    usual = UsualLabels(usual_scatter, np.zeros(k), np.zeros(k))
+    usual = UsualLabels(usual_scatter, *np.zeros((3, k)))
     scatter, V = np.zeros(k), np.zeros((k, k))
     if table is None:
         for one in declared.parameters:
@@ -47,7 +47,7 @@ def healthy_of(observer: Observer) -> Healthy:
         errors = ChannelErrors(np.ones(len(declared.outputs)), np.full(len(declared.outputs), UNIDENTIFIED_INFLATION))
         scatter[[names.index(one.name) for one in declared.parameters if one.scope == RUN]] = USUAL_OWN_SCATTER
         of_sessions = Scatter(np.sqrt(USUAL_SESSION_SHARE) * scatter)
-        return Healthy(effects, V, Scatter(scatter), of_sessions, UsualLabels(*np.zeros((3, k))), errors, 1.0, 1,
+        return Healthy(effects, V, Scatter(scatter), of_sessions, UsualLabels(*np.zeros((4, k))), errors, 1.0, 1,
                        HEALTHY.run_scale)  # fmt: skip
     # an effect that the vehicle has of an input that never moves here is none of these runs
     known = [n for n, name in enumerate(table.parameters) if name in names]
@@ -63,7 +63,8 @@ def healthy_of(observer: Observer) -> Healthy:
         name: float(np.sqrt(table.session_share)) * value for name, value in table.scatter.items()
     }
     for into, values in ((scatter, table.scatter), (session, shared), (usual.scatter, table.label_scatter),
-                         (usual.mean, table.label_mean), (usual.error, table.label_mean_error)):  # fmt: skip
+                         (usual.session, table.label_session_scatter), (usual.mean, table.label_mean),
+                         (usual.error, table.label_mean_error)):  # fmt: skip
         for name, value in values.items():
             if name in names:
                 into[names.index(name)] = value / effects[names.index(name)].spread
@@ -74,6 +75,8 @@ def healthy_of(observer: Observer) -> Healthy:
     )
     together = [_correlation(effects, table, one) for one in (table.scatter_correlation, table.session_correlation)]
     runs, sessions = (Scatter(sizes, one) for sizes, one in zip((scatter, session), together, strict=True))
+    if not table.label_session_scatter:  # a file that does not say
+        usual.session[:] = np.sqrt(session_share(runs, sessions, effects)) * usual.scatter
     return Healthy(effects, V, runs, sessions, usual, errors, table.inflation, table.runs, table.level_scatter,
                    table.noise_gain, table.run_inflation, table.sessions)  # fmt: skip
 

@@ -63,7 +63,8 @@ def tables(found: Identified) -> dict[str, Any]:
                         for by in (found.scatter, found.session_scatter))  # fmt: skip
     usual = {name: {one.label: float(s * one.spread) for one, s in zip(found.labels, row, strict=True)}
              for name, row in (("label_mean", found.usual.mean), ("label_mean_error", found.usual.error),
-                               ("label_scatter", found.usual.scatter))}  # fmt: skip
+                               ("label_scatter", found.usual.scatter),
+                               ("label_session_scatter", found.usual.session))}  # fmt: skip
     parameters = given.setdefault("parameters", {})
     sensors = given.setdefault("sensors", {})
     names, places, form, effects = [], [], {}, dict(declared.effects)

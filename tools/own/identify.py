@@ -14,7 +14,7 @@ from glider.tools.inference.pooled import (
     learn_scatter_together,
     marginalised,
 )
-from glider.tools.own.decision import UsualLabels
+from glider.tools.own.decision import UsualLabels, session_share
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import (
     FORM,
@@ -51,7 +51,7 @@ from glider.tools.own.runs_fit import (
     level_logs,
     level_scatter,
 )
-from glider.tools.own.usual_effects import usual_labels, with_usual_effects
+from glider.tools.own.usual_effects import KnownFromOthers, usual_labels, with_usual_effects
 
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run
 FILE_PRIOR = 2.0  # times the file's uncertainties: what the shared values may be
@@ -188,10 +188,15 @@ def identify(
     every, others = Pooled.of(warm, V), left_out(warm, V)
     between = run_inflation(every, others, vehicles)
     say(f"runs left out move the values by {np.sqrt(between):.1f} times what their likelihood says")
-    covariance = Pooled.of([marginalised(one, apart).tempered(between) for one in each], V).covariance()
+    each = [marginalised(one, apart).tempered(between) for one in each]
+    covariance = Pooled.of(each, V).covariance()
     operating_scatter = {one.name: float(np.sqrt(V[k, k])) for k, one in enumerate(nuisance) if one.at_point == 0}
     after = fit.held_out(every, others)
-    labels, usual_of_labels = usual_labels(replace(fit, scatter=scatter), others, eta)
+    share = session_share(scatter, session_scatter, nuisance) if len(counts) > 1 else 0.0
+    units = known_from_others(left_out(each, V) if len(counts) > 1 else others, apart, counts)
+    labels, usual_of_labels = usual_labels(replace(fit, scatter=scatter), units, eta, share)
+    if len(counts) < 2:
+        usual_of_labels = replace(usual_of_labels, session=np.sqrt(USUAL_SESSION_SHARE) * usual_of_labels.scatter)
     flown = [responses(observer.about(moved(observer.declared, observer.point, nuisance, own[n])), n, horizon, errors)
              for n in range(count)] if vehicle.declared.noises else []  # fmt: skip
     noise_gain = usual_gains(flown, noise_effects(vehicle.declared), NOISE_SIZES, errors, eta)
@@ -269,6 +274,18 @@ def learn_sessions(
         return within, learn_scatter(each, V, Scatter(usual))
     least = USUAL_SESSION_SHARE * np.where(np.isfinite(effects), effects, 0.0)
     return within, learn_scatter_together(each, V, usual, A, least=least)[0]
+
+
+def known_from_others(others: Sequence[Pooled], apart: Scatter, counts: Sequence[int]) -> list[KnownFromOthers]:
+    """Of each session, or of each run of a single one, what a vehicle of the others says; apart: what sessions differ
+    by."""
+    ends = np.cumsum(counts if len(counts) > 1 else np.ones(counts[0], dtype=int))
+    found = list[KnownFromOthers]()
+    for other, first, end in zip(others, [0, *ends[:-1]], ends, strict=True):
+        variances, axes = np.linalg.eigh(other.covariance() + apart.covariance)
+        root = axes * np.sqrt(np.maximum(variances, 0.0))
+        found.append(KnownFromOthers(range(first, end), other.mean(), root[:, variances > 0.0]))
+    return found
 
 
 def in_sessions(found: Sequence[Expansion], scatter: Scatter, counts: Sequence[int]) -> list[Parabola]:

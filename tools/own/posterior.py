@@ -24,6 +24,8 @@ from glider.tools.own.decision import (
     log_odds,
     log_prior,
     strangeness,
+    usual_share,
+    with_usual,
 )
 from glider.tools.own.effects import FORM, NOISE, PUSH, UNEXPLAINED, moved
 from glider.tools.own.evidence import Place, alone, size_evidence, under_priors
@@ -355,4 +357,20 @@ class Engine:
             for one in every:
                 if all(one is not kept for kept in front):
                     one.forget()
+        logs = with_usual(every, self.healthy, self.reach, self.count)
+        for one, log in zip(every, logs, strict=True):
+            if log > logs.max() - BEHIND:
+                one.usual = self.usual_beside(one)
         return every
+
+    def usual_beside(self, one: Hypothesis) -> float:
+        """Nat that a usual deviation of one label more brings a hypothesis, by its parabola: few pairs are fitted."""
+        places, every = self.healthy.at(one.labels), np.arange(self.k)
+        _, pooled, *_ = self.best_sizes(self.expansions(one.own, every), places, one.shared)
+        slope, precision = alone(pooled)
+        sided = np.array([effect.one_sided for effect in self.healthy.effects], dtype=bool)
+        asked = self.candidate & (self.reach > LEAST_REACH) & (precision > 0.0) & ~(sided & (slope < 0.0))
+        asked[places] = False
+        shares = [usual_share(self.healthy, k, float(self.reach[k]), float(slope[k] / precision[k]),
+                              float(precision[k] ** -0.5), self.count) for k in every[asked]]  # fmt: skip
+        return max(shares, default=0.0)

@@ -6,13 +6,13 @@ further one, is as probable as not before. The most evident is added and all is 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from glider.tools.inference.pooled import Pooled, log_prior, marginalised, without
+from glider.tools.inference.pooled import Parabola, Pooled, log_prior, marginalised, without
 from glider.tools.own.decision import SIZES, UsualLabels, log_odds
 from glider.tools.own.effects import PARAMETER, Effect, form_errors, standard_effects, unexplained
 from glider.tools.own.evidence import alone, size_evidence
@@ -21,6 +21,7 @@ from glider.tools.own.measure import total_rms
 from glider.tools.own.posterior import MOST_EFFECTS
 from glider.tools.own.runs_fit import MIN_SCATTER_RUNS, SCATTERS, USUAL_OWN_SCATTER, RunsFit
 
+SESSION_TIMES = np.geomspace(0.25, 16.0, 7)  # that sessions differ in a label as far as is usual over runs
 USUAL_LABEL = 0.01  # tolerances, from run to run; at most `USUAL_OWN_SCATTER` spreads
 MOST_TRIED, TRIED_ROUNDS = 3, 2  # labels that are fitted beside all else, and how long, before one is chosen
 
@@ -69,14 +70,18 @@ def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float) -> tuple[floa
 
 
 def _beside(fit: RunsFit, effect: Effect, prior: float) -> RunsFit:
-    """The fit with one more number that runs share, at 0."""
+    """The fit with one more number that runs share, at 0, and differ in as they do in labels."""
     V, runs = np.diag(np.append(np.zeros(len(fit.V)), prior**2)), len(fit.own)
     V[:-1, :-1] = fit.V
     low, high = fit.limits
+    at_0 = [expand(fit.observer, n, [*fit.nuisance, effect], np.append(row, 0.0), fit.errors, fit.observer.horizon)
+            for n, row in enumerate(fit.own)]  # fmt: skip
+    reach = float(np.sqrt(np.mean([one.reach[-1] for one in at_0])))
+    usual = USUAL_LABEL / max(reach, USUAL_LABEL / USUAL_OWN_SCATTER)
     return replace(
         fit, nuisance=[*fit.nuisance, effect], limits=(np.append(low, effect.low), np.append(high, effect.high)),
-        usual=np.append(fit.usual, 0.0), V=V, values=np.append(fit.values, 0.0),
-        own=np.column_stack([fit.own, np.zeros(runs)]), scatter=fit.scatter.beside(np.zeros(1)),
+        usual=np.append(fit.usual, usual), V=V, values=np.append(fit.values, 0.0),
+        own=np.column_stack([fit.own, np.zeros(runs)]), scatter=fit.scatter.beside(np.array([usual])),
     )  # fmt: skip
 
 
@@ -132,48 +137,83 @@ def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float
     return odds, eta
 
 
-def usual_labels(fit: RunsFit, others: Sequence[Pooled], eta: float) -> tuple[list[Effect], UsualLabels]:
-    """Every label, and what healthy runs show of each alone beside the numbers of runs: what all have, and what each.
+@dataclass(frozen=True)
+class KnownFromOthers:
+    """Runs that came together, as a vehicle identified from the others sees them."""
 
-    others: of each run what the others say (`left_out`); eta: how many errors are the same one. Every run is seen as
-    one that is asked about later: by a vehicle identified from the others, as certain as these make it. How runs
-    differ is where the marginal likelihood is largest, with the prior of `learn_scatter` for what it does in
-    tolerances, so that labels that act alike differ alike, in whatever unit. That all have some of a label is as
-    probable as not before, as where labels are added to the vehicle; sizes are a change's.
+    runs: Sequence[int]
+    values: np.ndarray  # (nuisance,)
+    root: np.ndarray  # (nuisance, m), root root' the covariance of what these runs are off that, all alike
+
+
+def usual_labels(
+    fit: RunsFit, units: Sequence[KnownFromOthers], eta: float, share: float
+) -> tuple[list[Effect], UsualLabels]:
+    """Every label, and what healthy runs show of each alone beside the numbers of runs: what all have, what sessions
+    differ by, and runs.
+
+    units: the runs of each session, or each run where there is but one; eta: how many errors are the same one; share:
+    usual variance between sessions over that from run to run. Every session is seen as one that is asked about later:
+    by a vehicle identified from the others, as certain as these make it. How runs and sessions differ is where the
+    marginal likelihood is largest, with the prior of `learn_scatter` for what runs' does in tolerances, so that labels
+    that act alike differ alike, in whatever unit, and for sessions' over that of runs. That all have some of a label is
+    as probable as not before, as where labels are added to the vehicle; sizes are a change's.
     """
     observer = fit.observer
     labels = standard_effects(observer.declared, observer.runs, observer.tolerances)
     labels += unexplained(observer.declared, observer.runs)
     every = [*labels, *form_errors(observer.declared)]
     into = _placed(fit.nuisance, every)
-    about = []
-    for n, without_it in enumerate(others):
-        variances, axes = np.linalg.eigh(without_it.covariance())
-        known, root = into @ without_it.mean(), into @ (axes * np.sqrt(np.maximum(variances, 0.0)))
-        one = expand(observer, n, every, into @ fit.own[n], fit.errors, observer.horizon).tempered(eta)
-        one = without(replace(one, at=one.at - known), into @ fit.scatter.root)
-        about.append(without(one, root))
-    slopes = np.array([-one.offset for one in about])[:, : len(labels)]
-    precisions = np.array([np.diag(one.curvature) for one in about])[:, : len(labels)]
-    reach = np.sqrt(np.mean([one.reach for one in about], axis=0))[: len(labels)]
+    found = [expand(observer, n, every, into @ row, fit.errors, observer.horizon).tempered(eta)
+             for n, row in enumerate(fit.own)]  # fmt: skip
+    reach = np.sqrt(np.mean([one.reach for one in found], axis=0))[: len(labels)]
     reach = np.maximum(reach, USUAL_LABEL / USUAL_OWN_SCATTER)
     scatters = SCATTERS[:, None] / reach  # (grid, labels) spreads
-    total = 1.0 + scatters[:, None] ** 2 * precisions  # (grid, runs, labels)
-    nat = 0.5 * (slopes**2 * scatters[:, None] ** 2 / total - np.log(total)).sum(axis=1)
+    per_unit = list[np.ndarray]()
+    for unit in units:
+        about = [replace(found[n], at=found[n].at - into @ unit.values) for n in unit.runs]
+        about = [without(one, into @ fit.scatter.root) for one in about]
+        per_unit.append(np.array([_in_common(about, into @ unit.root, k, scatters[:, k] ** 2)
+                                  for k in range(len(labels))]))  # fmt: skip
+    slopes, precisions, nat = np.array(per_unit).transpose(2, 3, 0, 1)  # (grid, units, labels) each
     usual = USUAL_LABEL if len(fit.own) >= MIN_SCATTER_RUNS else 5.0 * USUAL_LABEL
-    nat += log_prior(SCATTERS[:, None] ** 2, usual**2)
+    nat = nat.sum(axis=1) + log_prior(SCATTERS[:, None] ** 2, usual**2)
+    apart = np.sqrt(share) * SESSION_TIMES[:, None, None] * scatters  # (times, grid, labels) spreads
+    total = 1.0 + apart[:, :, None] ** 2 * precisions
+    nat = nat + 0.5 * (slopes**2 * apart[:, :, None] ** 2 / total - np.log(total)).sum(axis=2)
+    nat += log_prior(SESSION_TIMES**2, 1.0)[:, None, None]
     # what all have, one size after another, and none
-    slope, precision = (slopes / total).sum(axis=1), (precisions / total).sum(axis=1)
-    tau2 = (SIZES[:, None, None] / reach) ** 2
-    variance = tau2 / (1.0 + tau2 * precision)  # (sizes, grid, labels)
+    slope, precision = (slopes / total).sum(axis=2), (precisions / total).sum(axis=2)
+    tau2 = (SIZES[:, None, None, None] / reach) ** 2
+    variance = tau2 / (1.0 + tau2 * precision)  # (sizes, times, grid, labels)
     mean = variance * slope
     gain = 0.5 * (slope * mean + np.log(variance / tau2)) + np.array([log_odds(one) for one in labels])
     gain += np.where([one.one_sided for one in labels], np.log(2.0) + norm.logcdf(mean / np.sqrt(variance)), 0.0)
     gain = np.concatenate([np.zeros((1, *nat.shape)), gain - np.log(len(SIZES) * len(labels))])
-    best = np.argmax(nat + logsumexp(gain, axis=0), axis=0), np.arange(len(labels))
+    nat += logsumexp(gain, axis=0)
+    each = np.arange(len(labels))
+    times, grid = np.unravel_index(np.argmax(nat.reshape(-1, len(labels)), axis=0), nat.shape[:2])
     weights = np.exp(gain - logsumexp(gain, axis=0))[1:]
-    first, second = (weights * mean).sum(axis=0)[best], (weights * (variance + mean**2)).sum(axis=0)[best]
-    return labels, UsualLabels(scatters[best], first, np.sqrt(np.maximum(second - first**2, 0.0)))
+    first, second = (one.sum(axis=0)[times, grid, each] for one in (weights * mean, weights * (variance + mean**2)))
+    error = np.sqrt(np.maximum(second - first**2, 0.0))
+    return labels, UsualLabels(scatters[grid, each], apart[times, grid, each], first, error)
+
+
+def _in_common(about: Sequence[Parabola], root: np.ndarray, k: int, variances: np.ndarray) -> np.ndarray:
+    """Slope, precision and log evidence (3, grid) of what runs have in common of label k, beside deviations of each
+    run's own of `variances` (grid,) and deviations N(0, root root') of all."""
+    a, b = (np.array([root.T @ row for row in rows])
+            for rows in ([one.curvature[k] for one in about], [one.offset for one in about]))  # fmt: skip
+    alone, c = np.array([(one.curvature[k, k], one.offset[k]) for one in about]).T
+    kept = 1.0 / (1.0 + variances[:, None] * alone)  # (grid, runs)
+    taken = variances[:, None] * kept
+    A = sum(root.T @ one.curvature @ root for one in about) - np.einsum("gn,ni,nj->gij", taken, a, a)
+    across, slope = kept @ a, b.sum(axis=0) - (taken * c) @ a
+    solved = np.linalg.solve(np.eye(len(root.T)) + A, np.stack([across, slope], axis=2))
+    value = -(taken @ c**2) - np.log(kept).sum(axis=1) - (slope * solved[:, :, 1]).sum(axis=1)
+    value += np.linalg.slogdet(np.eye(len(root.T)) + A)[1]
+    return np.array([-(kept @ c - (across * solved[:, :, 1]).sum(axis=1)),
+                     kept @ alone - (across * solved[:, :, 0]).sum(axis=1), -0.5 * value])  # fmt: skip
 
 
 def _placed(nuisance: Sequence[Effect], effects: Sequence[Effect]) -> np.ndarray:

@@ -161,7 +161,7 @@ class WatchedRuns(Engine):
         its runs have it."""
         (first, *others), V, mean = sessions, self.together.V.copy(), np.zeros(self.k)
         for k in {label, *self.healthy.at([one.label for one in self.events])}:
-            mean[k], more = self.healthy.usual.of_session(k, self.healthy.session_share)
+            mean[k], more = self.healthy.usual.of_session(k)
             V[k, k] += more
         known = Pooled.of([replace(one, at=one.at - mean) for one in self.runs[: self.learned]], V)
         return [replace(first, mean=mean + known.mean(), V=known.covariance()), *others]

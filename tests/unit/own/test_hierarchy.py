@@ -55,7 +55,7 @@ class Columns:
 def usually(scatter: float = 0.0, mean: float = 0.0) -> UsualLabels:
     """Of the first label."""
     first = np.array([1.0, 0.0, 0.0])
-    return UsualLabels(scatter * first, mean * first, np.zeros(3))
+    return UsualLabels(scatter * first, scatter * first, mean * first, np.zeros(3))
 
 
 def by_itself(size: float) -> Scatter:
@@ -173,23 +173,25 @@ def test_what_all_healthy_runs_show_of_a_label_is_no_change_but_the_opposite_is(
 
 def test_what_sessions_differ_by_is_no_reason_for_a_change_within_one():
     """Within a session single runs scatter; another one differs as sessions do, and by what all have."""
-    usual = UsualLabels(np.full(3, 0.1), np.full(3, 0.5), np.full(3, 0.3))
+    usual = UsualLabels(np.full(3, 0.1), np.full(3, 0.2), np.full(3, 0.5), np.full(3, 0.3))
     for within, mean, variance in ((True, 0.0, 0.0025), (False, 0.5, 0.09 + 0.04 + 0.0025)):
-        assert usual.of_runs(0, 4, 4.0, within) == (mean, pytest.approx(variance))
+        assert usual.of_runs(0, 4, within) == (mean, pytest.approx(variance))
     asked = engine(4, usual=usual)
     within, beyond = (usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, within=one) for one in (True, False))
     assert within < beyond
 
 
-def test_of_a_label_that_gains_little_no_more_is_usual():
+def test_of_a_label_that_gains_little_no_more_is_usual_and_of_one_that_gains_much_all_but_what_is_not():
+    """By the parabola some 18 nat; a likelihood that falls faster towards no change has more."""
     asked = engine(4, usual=usually(3.0))
+    assert usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, gain=60.0) == pytest.approx(60.0, abs=2.5)
     assert usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, gain=5.0) == pytest.approx(5.0, abs=2.5)
     assert usual_share(asked.healthy, 0, 1.0, 0.5, 0.08, 4, gain=-5.0) == 0.0
 
 
 def test_two_labels_that_healthy_runs_show_are_no_change():
     """Both in their usual place: no change says as much as both; one of them beside what is not usual says nothing."""
-    both = healthy(usual=UsualLabels(np.full(3, 0.02), np.array([0.5, 0.4, 0.0]), np.zeros(3)))
+    both = healthy(usual=UsualLabels(np.full(3, 0.02), np.zeros(3), np.array([0.5, 0.4, 0.0]), np.zeros(3)))
 
     def at(labels, gain, sizes) -> Hypothesis:
         return Hypothesis(labels, gain + log_prior(both, labels), np.array(sizes), np.full(len(sizes), 0.08),

@@ -94,12 +94,12 @@ def test_a_session_far_off_differs_further_than_those_that_are_known(apart, n):
 def test_what_the_reference_has_of_a_label_is_known_from_its_runs():
     random, label = np.random.default_rng(5), 2
     runs, V = [parabola(random, np.array([0.0, 1.0, 0.4]), 5.0) for _ in range(4)], np.diag([0.5, 0.3, 0.0])
-    usual = UsualLabels(np.full(K, 0.2), np.full(K, 0.1), np.full(K, 0.3))
-    healthy = SimpleNamespace(usual=usual, session_share=4.0, at=lambda labels: [])
+    usual = UsualLabels(np.full(K, 0.2), np.full(K, 0.4), np.full(K, 0.1), np.full(K, 0.3))
+    healthy = SimpleNamespace(usual=usual, at=lambda labels: [])
     watched = SimpleNamespace(together=SimpleNamespace(V=V), k=K, healthy=healthy, runs=runs, learned=4, events=[])
     first, later = WatchedRuns.with_usual(watched, [session(4, 6, random), session(6, 8, random)], label)
     H, r = sum(one.curvature for one in runs), -sum(one.offset for one in runs)
-    prior = np.linalg.inv(V + np.diag([0.0, 0.0, 0.3**2 + 4.0 * 0.2**2]))
+    prior = np.linalg.inv(V + np.diag([0.0, 0.0, 0.3**2 + 0.4**2]))
     np.testing.assert_allclose(first.V, np.linalg.inv(prior + H))
     assert first.mean == pytest.approx(np.linalg.solve(prior + H, r + prior @ np.array([0.0, 0.0, 0.1])))
     assert (later.first, later.end) == (6, 8)
