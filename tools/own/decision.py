@@ -52,14 +52,6 @@ class UsualLabels:
         return float(self.mean[k]), float(self.error[k] ** 2 + self.session[k] ** 2)
 
 
-def session_share(scatter: Scatter, session: Scatter, effects: Sequence[Effect]) -> float:
-    """Variance between sessions over that from run to run, of all effects that differ (geometric mean) but instruments:
-    how their biases do, the vehicle file says."""
-    runs, sessions = scatter.sizes, session.sizes
-    differs = (runs > 0.0) & (sessions > 0.0) & [one.family != OUTPUT for one in effects]
-    return float(np.exp(2.0 * np.log(sessions[differs] / runs[differs]).mean())) if differs.any() else 0.0
-
-
 @dataclass(frozen=True)
 class Healthy:
     """What is known of the vehicle without a change, in the spreads of `effects`."""
@@ -169,7 +161,7 @@ def usual_share(
     within: bool = False,
 ) -> float:  # fmt: skip
     """Nat of the evidence of label k, its size known to sd, that a deviation as healthy runs have it, and the form of
-    effects beside it, bring too, by a parabola: one that gains `gain` nat, which is what the label does.
+    effects beside it, bring too, by a parabola: one that gains `gain` nat, as the label does (none given: one of sd).
 
     reach: tolerances that a spread of it moves the channels; moved: mean square that those effects move them by;
     within: what other runs of the session have in common of the label is no part of its size.
@@ -198,10 +190,9 @@ def with_usual(every: Sequence[Hypothesis], healthy: Healthy, reach: np.ndarray,
     What healthy runs show of a label is no change: a hypothesis without it explains that much, too, and so on with a
     label more. Far from what is usual the likelihood is no parabola: one that gains what a label really does is taken.
     """
-    gained = dict[frozenset[str], float]()
-    for one in sorted(every, key=lambda one: one.evidence):  # labels that were fitted twice: the better fit
-        gained[frozenset(one.labels)] = one.evidence - log_prior(healthy, one.labels)
-    most, by_form = {frozenset(one.labels): one.usual for one in every}, dict.fromkeys(gained, 0.0)
+    best = {frozenset(one.labels): one for one in sorted(every, key=lambda one: one.evidence)}  # of labels fitted twice
+    gained = {labels: one.evidence - log_prior(healthy, one.labels) for labels, one in best.items()}
+    most, by_form = {labels: one.usual for labels, one in best.items()}, dict.fromkeys(gained, 0.0)
     for one in sorted(every, key=lambda one: -len(one.labels)):  # of one with a label more it is known what that has
         own = frozenset(one.labels)
         moves = (one.sizes * reach[healthy.at(one.labels)]) ** 2

@@ -6,7 +6,7 @@ import numpy as np
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Scatter
-from glider.tools.own.decision import Healthy, UsualLabels, session_share
+from glider.tools.own.decision import Healthy, UsualLabels
 from glider.tools.own.declare import RUN
 from glider.tools.own.effects import (
     NOISE,
@@ -24,6 +24,7 @@ from glider.tools.own.hierarchy import ChannelErrors
 from glider.tools.own.identify import USUAL_SESSION_SHARE
 from glider.tools.own.observer import Observer
 from glider.tools.own.runs_fit import USUAL_OWN_SCATTER, USUAL_SCATTER
+from glider.tools.own.sessions import session_share
 
 UNIDENTIFIED_INFLATION = 30.0  # rows of a window that err alike, of a vehicle that was never identified
 

@@ -14,7 +14,7 @@ from glider.tools.inference.pooled import (
     learn_scatter_together,
     marginalised,
 )
-from glider.tools.own.decision import UsualLabels, session_share
+from glider.tools.own.decision import UsualLabels
 from glider.tools.own.declare import RUN, Declaration
 from glider.tools.own.effects import (
     FORM,
@@ -51,6 +51,7 @@ from glider.tools.own.runs_fit import (
     level_logs,
     level_scatter,
 )
+from glider.tools.own.sessions import session_share
 from glider.tools.own.usual_effects import KnownFromOthers, usual_labels, with_usual_effects
 
 USUAL_SESSION_SHARE = 0.25  # variance between sessions over that from run to run

@@ -366,7 +366,8 @@ class Engine:
     def usual_beside(self, one: Hypothesis) -> float:
         """Nat that a usual deviation of one label more brings a hypothesis, by its parabola: few pairs are fitted."""
         places, every = self.healthy.at(one.labels), np.arange(self.k)
-        _, pooled, *_ = self.best_sizes(self.expansions(one.own, every), places, one.shared)
+        found = one.found if one.everywhere else self.expansions(one.own, every)
+        _, pooled, *_ = self.best_sizes(found, places, one.shared)
         slope, precision = alone(pooled)
         sided = np.array([effect.one_sided for effect in self.healthy.effects], dtype=bool)
         asked = self.candidate & (self.reach > LEAST_REACH) & (precision > 0.0) & ~(sided & (slope < 0.0))

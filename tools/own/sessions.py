@@ -16,6 +16,7 @@ from scipy.special import logsumexp
 
 from glider.tools.inference.hyperparameters import HEALTHY
 from glider.tools.inference.pooled import Parabola, Pooled, Scatter, marginalised
+from glider.tools.own.effects import OUTPUT, Effect
 from glider.tools.own.hierarchy import Expansion
 
 TIMES = np.array([1.0, 2.0, 4.0, 8.0])  # that a session differs as far as is known of sessions
@@ -40,6 +41,14 @@ class Another:
     mean: np.ndarray  # (k,)
     V: np.ndarray  # (k, k)
     log_prior: float  # of these TIMES
+
+
+def session_share(scatter: Scatter, session: Scatter, effects: Sequence[Effect]) -> float:
+    """Variance between sessions over that from run to run, of all effects that differ (geometric mean) but instruments:
+    how their biases do, the vehicle file says."""
+    runs, sessions = scatter.sizes, session.sizes
+    differs = (runs > 0.0) & (sessions > 0.0) & [one.family != OUTPUT for one in effects]
+    return float(np.exp(2.0 * np.log(sessions[differs] / runs[differs]).mean())) if differs.any() else 0.0
 
 
 def split(sessions: Sequence[Session], first: int, another: Another) -> list[Session]:

@@ -35,7 +35,7 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
     added, gone = list[Effect](), set[str]()
     gaps = fit.left_out_gaps() if len(fit.own) >= MIN_SCATTER_RUNS else np.zeros(0)
     while gaps.any():
-        odds, eta = _log_odds(fit, added)
+        odds, reach, eta = _log_odds(fit, added)
         weak = [one for one in added if odds[one] <= 0.0]
         labels = [one for one in odds if odds[one] > 0.0 and one not in added and one.label not in gone]
         if weak:
@@ -43,7 +43,8 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
             gone.add(weak[0].label)
         elif labels and len(added) < MOST_EFFECTS:
             likeliest = sorted(labels, key=lambda one: -odds[one])[:MOST_TRIED]
-            _, tried, effect = max((_tried(fit, one, prior, eta) for one in likeliest), key=lambda one: one[0])
+            beside = (_tried(fit, one, prior, eta, reach[one]) for one in likeliest)
+            _, tried, effect = max(beside, key=lambda one: one[0])
             new = [*added, effect]
         else:
             break
@@ -58,9 +59,9 @@ def with_usual_effects(fit: RunsFit, prior: float, say: Callable[[str], None]) -
     return fit, added
 
 
-def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float) -> tuple[float, RunsFit, Effect]:
+def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float, reach: float) -> tuple[float, RunsFit, Effect]:
     """The fit led on with one more label, its log evidence, errors counted as before, and the label."""
-    led, level = _beside(fit, effect, prior), RunLevel(fit.errors, eta, 0.0)
+    led, level = _beside(fit, effect, prior, reach), RunLevel(fit.errors, eta, 0.0)
     for _ in range(TRIED_ROUNDS):
         found = led.expansions()
         led.stepped([one.tempered(eta) for one in found], found, level, lambda text: None)
@@ -69,14 +70,12 @@ def _tried(fit: RunsFit, effect: Effect, prior: float, eta: float) -> tuple[floa
     return Pooled.of(warm, led.V).log_evidence() + log_odds(effect), led, effect
 
 
-def _beside(fit: RunsFit, effect: Effect, prior: float) -> RunsFit:
-    """The fit with one more number that runs share, at 0, and differ in as they do in labels."""
+def _beside(fit: RunsFit, effect: Effect, prior: float, reach: float) -> RunsFit:
+    """The fit with one more number that runs share, at 0, and differ in as they do in labels; reach: tolerances that a
+    spread of it moves the channels."""
     V, runs = np.diag(np.append(np.zeros(len(fit.V)), prior**2)), len(fit.own)
     V[:-1, :-1] = fit.V
     low, high = fit.limits
-    at_0 = [expand(fit.observer, n, [*fit.nuisance, effect], np.append(row, 0.0), fit.errors, fit.observer.horizon)
-            for n, row in enumerate(fit.own)]  # fmt: skip
-    reach = float(np.sqrt(np.mean([one.reach[-1] for one in at_0])))
     usual = USUAL_LABEL / max(reach, USUAL_LABEL / USUAL_OWN_SCATTER)
     return replace(
         fit, nuisance=[*fit.nuisance, effect], limits=(np.append(low, effect.low), np.append(high, effect.high)),
@@ -96,9 +95,10 @@ def _without(fit: RunsFit, effect: Effect) -> RunsFit:
     )  # fmt: skip
 
 
-def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float], float]:
+def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float], dict[Effect, float], float]:
     """Log odds, by the parabola and all else integrated out, of labels that are not among what runs share and of those
-    that were added to it, and how many errors are the same one.
+    that were added to it; tolerances that a spread of each of the former moves the channels; and how many errors are
+    the same one.
 
     A label's slope is the sum of what every run says: where runs differ in it by more than their likelihood has it, it
     counts for so much less (the sandwich variance).
@@ -134,7 +134,7 @@ def _log_odds(fit: RunsFit, added: Sequence[Effect]) -> tuple[dict[Effect, float
     new = np.arange(first, len(effects))
     odds = dict(zip(labels, log_odds_of(new), strict=True))
     odds |= {one: float(log_odds_of(np.array([fit.nuisance.index(one)]))[0]) for one in added}
-    return odds, eta
+    return odds, dict(zip(labels, reach[new].tolist(), strict=True)), eta
 
 
 @dataclass(frozen=True)

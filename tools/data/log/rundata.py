@@ -34,6 +34,7 @@ from glider.tools.data.runs.case import (
     case_text,
     write_case,
 )
+from glider.tools.data.runs.overview import unit_of
 from glider.tools.data.runs.run import Run
 from glider.tools.data.sources import name_or_path
 
@@ -42,7 +43,6 @@ EXTRA_FILE = "extra.csv"  # an imported run's columns that are no numbers, behin
 # Metadata of a log that was made from run data: there a column of gaps was recorded, elsewhere it was not.
 SOURCE, RUN_DATA = "source", "run data"
 FLIGHT_FILE, FLIGHT_START = "flight_file", "flight_start_utc"  # of the flight that the run data were made of
-_UNITS = (("_rad_s", "rad/s"), ("_rad", "rad"), ("_kg", "kg"), ("_m", "m"), ("_s", "s"))
 
 
 @dataclass
@@ -246,13 +246,9 @@ def _exact_numbers(texts: list[str]) -> np.ndarray | None:
     return values if _exact_texts(values) == texts else None
 
 
-def _unit(name: str) -> str:
-    return next((unit for ending, unit in _UNITS if name.endswith(ending)), "1")
-
-
 def _field(name: str) -> Field | None:
     try:
-        return Field(name, _unit(name))
+        return Field(name, unit_of(name))
     except ValueError:
         return None
 
@@ -269,7 +265,7 @@ def write_log(path: Path | str, case: Case, run: Run) -> Path:
     fields, values = [], []
     texts: dict[str, list[str]] = {}
     for name, column in run.columns.items():
-        fields.append(Field(name, _unit(name)))
+        fields.append(Field(name, unit_of(name)))
         values.append(column)
     for name, words in run.extra.items():
         item, numbers = _field(name), _exact_numbers(words)

@@ -23,15 +23,19 @@ class Column:
     missing_percent: float
 
 
+def unit_of(name: str) -> str:
+    """The unit of a column, by what its name ends in."""
+    return next((unit for ending, unit in UNITS if name.endswith(ending)), "1")
+
+
 def overview(runs: Sequence[Run]) -> list[Column]:
     """The columns of the runs, in the order of run data."""
     found = []
     for name in names.in_order(list(dict.fromkeys(one for run in runs for one in run.columns))):
         values = np.concatenate([run.columns.get(name, np.full(run.rows, np.nan)) for run in runs])
         seen = values[np.isfinite(values)]
-        unit = next((unit for ending, unit in UNITS if name.endswith(ending)), "1")
         smallest, largest = (float(seen.min()), float(seen.max())) if seen.size else (None, None)
-        found.append(Column(name, unit, smallest, largest, 100.0 * (1.0 - seen.size / max(len(values), 1))))
+        found.append(Column(name, unit_of(name), smallest, largest, 100.0 * (1.0 - seen.size / max(len(values), 1))))
     return found
 
 
